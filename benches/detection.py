@@ -56,7 +56,7 @@ def row(board: Board, size: tuple[int, int], count: int) -> str:
         start = time.process_time()
         found: Calibration = read(Path(name), board=board)
         seen = time.process_time()
-        adjusted = found.adjust().result
+        adjusted = found.adjust()
         end = time.process_time()
     rms = float(np.sqrt((adjusted.residuals**2).mean()))
     pictures = f"{len(found.corners.pictures)} of {count}"

@@ -93,9 +93,8 @@ def ours(path: Path, off: float) -> tuple[list[Pair], str]:
     for distance in (math.inf, 1.0):
         uncertainty_map(found, 0, distance)
     times.append(clock())
-    result = found.result
-    cost, iterations = result.sums_of_squares.total, len(result.iterations)
-    return between(times), f"{result.status}, {iterations} iterations, cost {cost:.6f}"
+    cost, iterations = found.sums_of_squares.total, len(found.iterations)
+    return between(times), f"{found.status}, {iterations} iterations, cost {cost:.6f}"
 
 
 def between(times: Sequence[Pair]) -> list[Pair]:

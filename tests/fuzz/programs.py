@@ -27,7 +27,6 @@ from photogram.cli import (
     stellar_camera,
 )
 from photogram.cli.console import errors, output
-from photogram.targets import Calibrated
 
 from .boards import board_run
 from .projects import PROJECTS, project_run
@@ -305,8 +304,6 @@ PROGRAMS |= {f"project: {name}": (project_run(main), often) for name, (main, oft
 
 def unsound(result: Any) -> str | None:
     """Name what is not finite in a result that converged without a remark; None where all is well."""
-    if isinstance(result, Calibrated):
-        result = result.result
     if not getattr(result, "converged", False) or getattr(result, "messages", None):
         return None
     values = {

@@ -78,10 +78,10 @@ def test_the_optimum_with_the_priors_of_mrcal_is_its_own(tmp_path):
     start = started("cahvor", regularise="mrcal")
     free = start.cameras[0].replace(sd=dict.fromkeys(NAMES, math.inf))
     near = start.replace(cameras=[free]).adjust()
-    assert "fx of left; fy of left; r0 of left" in str(near.result.messages[0])
+    assert "fx of left; fy of left; r0 of left" in str(near.messages[0])
     # Along these three the sum of squares stands still before its last digits: once more from the priors.
-    found = near.restarted().replace(cameras=[near.cameras[0].restarted()]).adjust()
-    assert found.result.sums_of_squares.total == pytest.approx(COST, rel=1e-11)
+    found = near.restarted_calibration().replace(cameras=[near.cameras[0].restarted()]).adjust()
+    assert found.sums_of_squares.total == pytest.approx(COST, rel=1e-11)
     camera = found.cameras[0]
     np.testing.assert_allclose((camera.values - OPTIMUM) / camera.sd, 0, atol=1e-4)
     # What goes to mrcal is read again as the same calibration.
@@ -91,13 +91,13 @@ def test_the_optimum_with_the_priors_of_mrcal_is_its_own(tmp_path):
     assert again.regularise == "mrcal"
     np.testing.assert_array_equal(again.cameras[0].values, camera.values)
     assert np.isinf(again.cameras[0].deviations).all()
-    assert again.adjust().result.sums_of_squares.total == pytest.approx(COST, rel=1e-11)
+    assert again.adjust().sums_of_squares.total == pytest.approx(COST, rel=1e-11)
 
 
 def test_first_values_are_found_and_the_lens_agrees_with_another():
     found, other = started("cahvor").adjust(), started("opencv5").adjust()
     assert found.cameras[0].values[6] == 0, "fx and fy do what r0 does"
-    sigmas = [np.sqrt(each.result.variance_of_unit_weight) for each in (found, other)]
+    sigmas = [np.sqrt(each.variance_of_unit_weight) for each in (found, other)]
     assert sigmas[0] == pytest.approx(sigmas[1], rel=1e-3)
     assert difference(found, other, (400.0, 4000.0)).rms < 0.05
     # mrcal has no term that is held alone: its tools are told the camera, but not how it was found.

@@ -100,11 +100,11 @@ def test_snooping_takes_gross_errors_out_and_says_which(left):
 def test_outliers_as_mrcal_marks_them(left):
     calibration = read(left)
     plain, without = calibration.adjust(), calibration.adjust(outliers="mrcal")
-    weighted = without.result.residuals
+    weighted = without.residuals
     assert np.abs(weighted).max() <= 5 * np.sqrt((weighted**2).mean())
     assert np.count_nonzero(~without.calibration.corners.use) > 5
-    assert len(plain.result.residuals) == len(weighted) + np.count_nonzero(~without.calibration.corners.use)
-    assert "targets.removed" in [each.code for each in without.result.messages]
+    assert len(plain.residuals) == len(weighted) + np.count_nonzero(~without.calibration.corners.use)
+    assert "targets.removed" in [each.code for each in without.messages]
 
 
 @pytest.mark.parametrize(

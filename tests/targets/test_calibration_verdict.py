@@ -8,7 +8,7 @@ from seen_boards import seen
 
 from photogram import Camera
 from photogram.targets import Board, Calibration, WorthOptions, appraise
-from photogram.targets.findings import judged, showings
+from photogram.targets.findings import showings
 
 BOARD = Board(columns=9, rows=7, spacing=0.03, shape="held")
 TRUTH = Camera(
@@ -78,9 +78,8 @@ def test_check_points_are_no_word_of_calibrations():
 
 def test_other_views_judge_and_all_say_the_same():
     found = calibrated()
-    whole = judged(found, appraise(found, WorthOptions(grid=(6, 4))))
+    whole = found.with_worth(appraise(found, WorthOptions(grid=(6, 4))))
     assert any("cross-validation explained" in str(each) for each in whole.verdict.lines)
-    assert whole.result.verdict == whole.verdict
     assert whole.verdict.headline.encode() in whole.to_html()
     assert json.loads(whole.to_json())["verdict"]["headline"] == whole.verdict.headline
     assert whole.document().judgements[0].headline == whole.verdict.headline
@@ -93,7 +92,7 @@ def test_a_lens_that_is_too_stiff_is_named():
     held = plain.replace(sd={"fx": np.inf, "fy": np.inf, "cx": np.inf, "cy": np.inf})
     corners, poses = seen(BOARD, TRUTH, SIZE, views=14, seed=3, sd=0.2)
     found = Calibration(board=BOARD, corners=corners, cameras=[held], poses=poses, sd0=0.2).adjust()
-    whole = judged(found, appraise(found, WorthOptions(grid=(6, 4))))
+    whole = found.with_worth(appraise(found, WorthOptions(grid=(6, 4))))
     assert not whole.verdict.usable
     assert "opencv8" in models_of(whole)
     assert any(each.name == "cross-validation of camera" for each in whole.verdict.tests)
@@ -126,4 +125,4 @@ def test_snooping_has_the_same_words():
     found = start.snoop()
     assert found.verdict.code == "usable-after-removal"
     assert ("line.board", 8) in {(each.code, each.fields.get("n")) for each in found.verdict.lines}
-    assert found.snooped.verdict == found.verdict == found.snooped.result.verdict
+    assert found.verdict == found.result.verdict

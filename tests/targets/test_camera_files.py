@@ -150,8 +150,8 @@ def test_mrcal_has_the_whole_calibration(pair, tmp_path):
     name = next(iter(files))
     (tmp_path / name).write_bytes(files[name])
     again = read_model(tmp_path / name).adjust()
-    assert again.result.sum_and_freedom[0] == pytest.approx(
-        pair.result.sum_and_freedom[0] * (pair.calibration.sd0 or 1.0) ** 2, rel=1e-9
+    assert again.sum_and_freedom[0] == pytest.approx(
+        pair.sum_and_freedom[0] * (pair.calibration.sd0 or 1.0) ** 2, rel=1e-9
     )
 
 

@@ -78,14 +78,14 @@ def test_offset_lens_and_rig_are_found_with_their_uncertainty():
     assert late.sd[0] < 1e-4
     assert np.abs(found.sensors[1, :3, 3] - [-0.1, 0, 0]).max() < 1e-3
     assert cross_validate(found, "odd").explained
-    names = [each.name for each in found.result.unknowns]
+    names = [each.name for each in found.unknowns]
     assert len(set(names)) == len(names)
 
 
 def test_a_synchronised_adjustment_of_the_same_corners_does_not_fit():
     given = rig()
-    assert given.replace(sync="known", motion=None).adjust().result.variance_of_unit_weight > 10
-    assert given.adjust().result.variance_of_unit_weight < 1.2
+    assert given.replace(sync="known", motion=None).adjust().variance_of_unit_weight > 10
+    assert given.adjust().variance_of_unit_weight < 1.2
 
 
 def test_pictures_at_the_ends_of_a_sequence_are_named():
@@ -99,7 +99,7 @@ def test_a_board_that_does_not_move_is_that_of_a_synchronised_rig():
     corners = known.corners.replace(times=0.1 * known.corners.views)
     views = corners.view_count
     still = known.replace(corners=corners, sync="offset", sd_offsets=0.0, motion=np.zeros((views, 4, 6)))
-    first, second = (Calibrated(calibration=each, result=adjust(each.block())) for each in (known, still))
+    first, second = (Calibrated.of(adjust(each.block()), each) for each in (known, still))
     parts = ("cameras", "sensors", "board", "views")
     (names, a), (others, b) = first.cofactors(parts), second.cofactors(parts)
     assert names == others
@@ -114,7 +114,7 @@ def test_what_hardly_moves_tells_no_offset():
         slow.adjust()
     weighted = slow.replace(sd_offsets=1e-4, offsets=[0, LATE]).adjust()
     assert weighted.offsets["b"].sd[0] <= 1.01e-4
-    assert "targets.offset.small" in [each.code for each in weighted.result.messages]
+    assert "targets.offset.small" in [each.code for each in weighted.messages]
 
 
 def test_motion_is_that_of_polynomials_through_neighbours():

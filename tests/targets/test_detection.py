@@ -122,7 +122,7 @@ def test_a_folder_of_photographs_is_calibrated(folder):
     assert "targets.without-board names=['cat.png']" in map(described, found.messages)
     assert found.corners.sizes == (SIZE,)
     calibrated = found.adjust()
-    assert calibrated.result.variance_of_unit_weight < 1.5
+    assert calibrated.variance_of_unit_weight < 1.5
     camera = calibrated.cameras[0]
     for name in ("fx", "fy", "cx", "cy", "k1", "k2"):
         assert abs(camera.value(name) - TRUTH[name]) < 4 * camera.deviation(name), name

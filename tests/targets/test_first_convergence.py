@@ -26,13 +26,13 @@ def adjusted_left(corners):
 
 
 def cost(found):
-    return found.result.sum_and_freedom[0]
+    return found.sum_and_freedom[0]
 
 
 def test_the_left_pictures_end_where_they_should():
     known = golden("opencv_left")["left"]["solution"]
     found = adjusted_left(left()[1])
-    assert found.result.converged
+    assert found.converged
     assert cost(found) == pytest.approx(known["cost"], rel=1e-9)
     values = [found.cameras[0].camera.parameters[name] for name in known["order"].split()]
     np.testing.assert_allclose((np.array(values) - known["parameters"]) / known["sd"], 0, atol=1e-4)
@@ -86,7 +86,7 @@ def test_the_rig_converges_where_boards_of_both_cameras_are_turned():
     """Nothing but the shape of the board could tell how these were turned."""
     board, corners = rig()
     first, found = adjusted_rig(relisted(board, corners, dict.fromkeys(np.flatnonzero(corners.views < 4), 3)))
-    assert found.result.converged
+    assert found.converged
     assert np.isfinite(first.poses).all()
 
 
@@ -116,7 +116,7 @@ def test_knots_begin_as_the_lens_that_needs_none():
 def test_every_third_picture_of_it_is_enough():
     board, corners = wide(step=3)
     found = calibration(board, first_values(board, corners)).adjust()
-    assert found.result.converged
-    squares, freedom = found.result.sum_and_freedom
+    assert found.converged
+    squares, freedom = found.sum_and_freedom
     # Of residuals in pixels.
     assert found.calibration.assumed**2 * squares / freedom < 0.35

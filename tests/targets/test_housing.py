@@ -29,7 +29,7 @@ def test_a_weighted_sensor_is_known_before_the_corners():
     """Q = (N + P)^-1 with the weight P of the sensor, and Q N Q what corners alone make of it."""
     free = adjusted_rig()
     sd = np.array([2e-5, 3e-5, 4e-5, 5e-5, 6e-5, 7e-5])
-    given = free.restarted()
+    given = free.restarted_calibration()
     weighted = given.replace(sd_sensors=np.stack([np.full(6, np.inf), sd])).adjust()
     steps = sensor_steps(free.sensors[1])
     before, after = housing_of(free)[0], housing_of(weighted)[0]
@@ -47,4 +47,4 @@ def test_a_weighted_sensor_is_known_before_the_corners():
     assert np.abs((found - noise) / np.outer(scale, scale)).max() < 1e-4
     assert np.all(np.diag(after.cofactors)[own] < np.diag(before.cofactors)[own])
     assert cross_validate(weighted).explained
-    assert weighted.restarted().sensors[1] == pytest.approx(given.sensors[1], abs=0)
+    assert weighted.restarted_calibration().sensors[1] == pytest.approx(given.sensors[1], abs=0)

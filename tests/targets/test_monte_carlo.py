@@ -72,13 +72,13 @@ def test_triangulated_points(draws):
     for each in draws:
         found = triangulate(each, (0, 1), np.stack(seen, axis=1), 0.3)
         error = (found.points - POINTS).ravel()
-        covariance = found.by_calibration / each.result.covariance_scale
+        covariance = found.by_calibration / each.covariance_scale
         by_axes.append(error @ np.linalg.solve(covariance, error) / 6)
         change, housing = _errors(each)
         motion = housing_rows(housing)[:, :22] @ change
         fixed = triangulate(each, (0, 1), np.stack(seen, axis=1), 0.3, "corners")
         left = error - (motion[:3] + np.cross(motion[3:], POINTS)).ravel()
-        covariance = fixed.by_calibration / each.result.covariance_scale
+        covariance = fixed.by_calibration / each.covariance_scale
         by_housing.append(left @ np.linalg.solve(covariance, left) / 6)
     assert _within(by_axes, 6)
     assert _within(by_housing, 6)

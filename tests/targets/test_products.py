@@ -42,7 +42,7 @@ def test_covariances_at_pixels_are_the_golden_ones(calibrated):
     expected = golden("rig_small")["uncertainty"]
     found = projection_uncertainty(calibrated, "right", expected["pixels"], 1.0, "mean-frames")
     cofactors = np.array(expected["camera 1, 1 m"]["mean_frames_cofactors"])
-    scale = calibrated.result.covariance_scale
+    scale = calibrated.covariance_scale
     assert np.abs(found / scale - cofactors).max() < 1e-6 * cofactors.max()
 
 
@@ -184,7 +184,7 @@ def test_maps_with_a_board_of_two_parabolas(camera, distance):
     found = bent_rig()
     pixels = golden("rig_small")["uncertainty"]["pixels"]
     away = np.inf if distance == "infinity" else 1.0
-    own = projection_uncertainty(found, camera, pixels, away, "mean-frames") / found.result.covariance_scale
+    own = projection_uncertainty(found, camera, pixels, away, "mean-frames") / found.covariance_scale
     cofactors = np.array(expected["cofactors"])
     largest = np.abs(cofactors).max(axis=(1, 2))
     assert (np.abs(own - cofactors).max(axis=(1, 2)) < 1e-6 * largest).all()
@@ -199,7 +199,7 @@ def test_the_file_of_mrcal_gives_its_map():
     """Corners, board, start and priors of a `.cameramodel`: the uncertainty that mrcal computes of it."""
     data = golden("mrcal_opencv8")["uncertainty"]
     found = read(shared("targets", "opencv8-0.cameramodel")).adjust()
-    scale = found.result.covariance_scale
+    scale = found.covariance_scale
     for name, distance in (("infinity", np.inf), ("1 m", 1.0)):
         own = projection_uncertainty(found, 0, data["pixels"], distance, "mean-frames", noise_only=True)
         expected = np.array(data[name]["mean_frames_covariance_mrcal_2_2"]) / data["sigma"] ** 2

@@ -70,7 +70,7 @@ def test_a_knot_in_the_very_middle_is_as_free_across_as_along():
 
 def test_golden_cost_and_cofactors_of_knots():
     wanted, found = golden("splined")["adjusted"]["solution"], adjusted()
-    assert found.result.sums_of_squares.total == pytest.approx(wanted["cost"], rel=1e-10)
+    assert found.sums_of_squares.total == pytest.approx(wanted["cost"], rel=1e-10)
     names, cofactors = found.cofactors(("cameras", "board"))
     rows = [k for k, name in enumerate(names) if name.split()[-1].startswith("d")]
     assert names[rows[2]] == "own dx_1_0"
@@ -83,7 +83,7 @@ def test_golden_maps(distance, key):
     for datum in ("corners", "mean-frames"):
         wanted = np.array(data[key][f"{datum.replace('-', '_')}_cofactors"])
         own = projection_uncertainty(adjusted(), 0, data["pixels"], distance, datum)
-        cofactors = own / adjusted().result.covariance_scale
+        cofactors = own / adjusted().covariance_scale
         assert np.abs(cofactors - wanted).max() < 1e-6 * np.abs(wanted).max()
 
 
@@ -164,6 +164,6 @@ def test_few_views_converge_though_most_knots_are_from_their_priors():
     some = np.arange(len(whole.corners.pictures)) % 12 == 3
     part = whole.replace(corners=whole.corners.of_pictures(some), poses=np.asarray(whole.poses)[some])
     found = part.adjust()
-    assert found.result.converged
-    assert found.result.sums_of_squares.total == pytest.approx(305.570709, abs=1e-4)
+    assert found.converged
+    assert found.sums_of_squares.total == pytest.approx(305.570709, abs=1e-4)
     assert _knots(found)["from_prior"] > 100

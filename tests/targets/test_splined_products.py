@@ -57,7 +57,7 @@ def splined():
 def test_maps(name, distance, datum, noise_only, key):
     data, found = golden("splined")["adjusted"]["uncertainty"], splined()
     own = projection_uncertainty(found, 0, data["pixels"], distance, datum, noise_only)
-    own = own / found.result.covariance_scale
+    own = own / found.covariance_scale
     expected = np.array(data[name][key])
     largest = np.abs(expected).max(axis=(1, 2))
     assert (np.abs(own - expected).max(axis=(1, 2)) < 1e-6 * largest).all()

@@ -57,7 +57,7 @@ def test_what_is_promised_is_what_corners_with_errors_give(plan):
         forms.append(error @ inverse @ error)
     # A mean of chi2 of 108 degrees of freedom over 12.
     assert np.mean(forms) / 9 == pytest.approx(1, abs=3.5 * math.sqrt(2 / 108))
-    scale = math.sqrt(found.result.covariance_scale)
+    scale = math.sqrt(found.covariance_scale)
     same = uncertainty_map(found, 0, 0.7).largest / scale
     assert plan.maps[1].largest == pytest.approx(same, rel=0.05)
 
@@ -71,7 +71,7 @@ def test_what_a_data_sheet_says_does_not_matter(plan):
         )
     ]
     drawn = simulate_corners(own.replace(cameras=free), 1).adjust()
-    sd = drawn.cameras[0].sd / math.sqrt(drawn.result.covariance_scale)
+    sd = drawn.cameras[0].sd / math.sqrt(drawn.covariance_scale)
     assert sd[:9] == pytest.approx(plan.calibrated.cameras[0].sd[:9], rel=0.03)
 
 

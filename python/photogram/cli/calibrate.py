@@ -89,14 +89,17 @@ def calibrate(
     options: dict[str, Any] = {"loss": choices.get("loss"), "outliers": outliers, "threads": threads}
     with adjustment_status(job) as adjusting:
         if snoop:
-            found = calibration.snoop(snooping, threads=threads, progress=adjusting)
+            snooped = calibration.snoop(snooping, threads=threads, progress=adjusting)
+            found = snooped.result
         else:
-            found = calibration.adjust(**options, progress=adjusting)
-    ratio = choices.get("max_bias_ratio")
-    found = replace(found, result=found.result.with_max_bias_ratio(ratio))
+            snooped, found = None, calibration.adjust(**options, progress=adjusting)
+    found = found.with_max_bias_ratio(choices.get("max_bias_ratio"))
     second = None if compare_with is None else lambda: _read(compare_with, seen).adjust(**options)
     found = _appraised(job, found, worth, need, second)
-    document, files = found.document(), _files(found, to or [], need)
+    snooped = snooped and replace(snooped, result=found)
+    document, files = (snooped or found).document(), _files(found, to or [], need)
+    if snooped is not None:
+        files["removed.csv"] = snooped.table().to_csv(index=False).encode()
     if components:
         from photogram.results.components import components_section
 
@@ -108,10 +111,10 @@ def calibrate(
     plots = drawings(found.worth) if found.worth is not None else []
     documents.conclude(
         job,
-        found,
+        snooped or found,
         files,
         document=document,
-        network=found.result,
+        network=found,
         plots=lambda: {each.name: each.sketch() for each in plots},
         tables=("uncertainty", "board", "views"),
         code=found.verdict.exit_code(strict=strict),
@@ -209,7 +212,6 @@ def _appraised(
 ) -> Calibrated:
     """Return an adjusted calibration with its uncertainty, and its differences from another one."""
     from photogram.targets.appraisal import appraise
-    from photogram.targets.findings import judged
     from photogram.targets.uncertainty import difference
 
     with job.status("uncertainty") as progress:
@@ -220,7 +222,7 @@ def _appraised(
         distances = options.distances or [math.inf]
         apart = [difference(found, second, distances, camera=number) for number in range(count)]
         worth = replace(worth, differences=tuple(apart))
-    return judged(found, worth, need)
+    return found.with_worth(worth, need)
 
 
 def _files(found: Calibrated, formats: Sequence[str], need: float | None) -> dict[str, bytes]:
@@ -235,13 +237,11 @@ def _files(found: Calibrated, formats: Sequence[str], need: float | None) -> dic
     from photogram.targets.grouping import views
     from photogram.targets.page import worth_files
 
-    files = {**table_files(found.result), "views.csv": csv_text(frame(views(found)))}
+    files = {**table_files(found), "views.csv": csv_text(frame(views(found)))}
     plain = to_files(adjusted_project(found), "plain")
     files |= {f"adjusted/{name}": content for name, content in plain.items()}
     if found.worth is not None:
         files |= worth_files(found.worth)
-    if found.snooped is not None:
-        files["removed.csv"] = found.snooped.table().to_csv(index=False).encode()
     for name in formats:
         cameras = camera_files(found, name, need if name == "mrcal" else None)
         files |= {f"{name}/{file}": content for file, content in cameras.items()}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -62,7 +62,10 @@ class AdjustedCollection(AdjustedNetwork):
     point_rays_behind: Indices
     datum: list[tuple[int, str]]
 
-    KNOWN: ClassVar[bool] = False
+    @property
+    def known_weight(self) -> bool:
+        """False: the standard deviations of collections are unknown."""
+        return False
 
     def _findings(self) -> Findings:
         from photogram.collection.findings import collection_findings

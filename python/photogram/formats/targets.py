@@ -240,7 +240,7 @@ def _with_places(board: Board, block: Block, number: Indices) -> Board:
 
 def adjusted_project(calibrated: Calibrated) -> Project:
     """Convert an adjusted calibration to a project with adjusted values."""
-    return project_of(calibrated.restarted())
+    return project_of(calibrated.restarted_calibration())
 
 
 def shifted(camera: Camera, by: float = MIDDLE) -> Camera:

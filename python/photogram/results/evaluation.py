@@ -31,7 +31,7 @@ def reliability_summary(result: AdjustedNetwork) -> ReliabilitySummary | None:
     if not (computed and result.converged and result.degrees_of_freedom > 0):
         return None
     refused = LostSupportError, _photocore.BlockError, _photocore.CollectionError
-    facts, weight = result._hypothesis_facts(), "known" if result.KNOWN else "unknown"
+    facts, weight = result._hypothesis_facts(), "known" if result.known_weight else "unknown"
     found = errors = lost = None
     # Other results remain valid; a network that is singular by rounding has a message already.
     with suppress(*refused):
@@ -70,7 +70,7 @@ def evaluated(
     result: AdjustedNetwork, found: Reliability, facts: Facts
 ) -> tuple[Hypotheses, list[TypeFactor]]:
     """Evaluate the hypotheses of the catalogue with some facts, and standard deviations by type."""
-    known, limit = result.KNOWN, result.max_bias_ratio
+    known, limit = result.known_weight, result.max_bias_ratio
     standing = found.standing.sum_and_freedom if known else result.sum_and_freedom
     types = type_factors(found.trial, found.tests, limit, standing) if known else []
     parts = found.trial, found.tests, facts, result._terms.point_axes, standing, limit

@@ -63,13 +63,13 @@ def network_findings(
     test = _whole_test(result)
     assumed = [] if summary is None else summary.hypotheses.assumed()
     assumptions = [Phrase("line.datum-assumed", {"errors": assumed})] if assumed else []
-    rivals, known = largest_odds(fixed), result.KNOWN and summary is not None
+    rivals, known = largest_odds(fixed), result.known_weight and summary is not None
     inseparable = [] if summary is None else summary.hypotheses.inseparable(rivals)
     return Findings(
         status=result.status,
         observations=[
             *(tests.components if summary is None else tests.groups),
-            *(each if result.KNOWN else each.studentized(*result.sum_and_freedom) for each in fixed),
+            *(each if result.known_weight else each.studentized(*result.sum_and_freedom) for each in fixed),
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=test,
@@ -122,7 +122,7 @@ def _whole_test(result: AdjustedNetwork) -> GlobalTest | None:
         return result.global_test
     summary = result.reliability_summary
     constrained = getattr(result, "unit_variance", "constrained") == "constrained"
-    if summary is None or not result.KNOWN or not constrained:
+    if summary is None or not result.known_weight or not constrained:
         return None
     return global_test(*summary.standing.sum_and_freedom)
 

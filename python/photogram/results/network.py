@@ -134,9 +134,6 @@ class AdjustedNetwork(Valued, Judged, Documented, ABC):
     snooped: Removed | None = None
     max_bias_ratio: float = MAX_BIAS_RATIO
 
-    KNOWN: ClassVar[bool] = True
-    """Whether standard deviations are given, so that the unit weight is known."""
-
     def __post_init__(self) -> None:
         freeze_fields(self)
 
@@ -194,6 +191,11 @@ class AdjustedNetwork(Valued, Judged, Documented, ABC):
     @property
     @abstractmethod
     def sum_and_freedom(self) -> tuple[float, float]: ...
+
+    @property
+    def known_weight(self) -> bool:
+        """Whether standard deviations are given, so that the unit weight is known."""
+        return True
 
     @property
     def global_test(self) -> GlobalTest | None:

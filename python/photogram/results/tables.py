@@ -100,7 +100,7 @@ class Tests:
     @cached_property
     def components(self) -> list[ComponentTests]:
         """The tests of all components: w if the unit weight is known, else t."""
-        if self._result.KNOWN:
+        if self._result.known_weight:
             return self.normal
         return [tests.studentized(*self._result.sum_and_freedom) for tests in self.normal]
 
@@ -134,7 +134,7 @@ class Tests:
             for title, groups, rows in types
             if testable[groups].any()
         ]
-        if result.KNOWN:
+        if result.known_weight:
             return found
         tested = summary.standing if result.loss else result
         return [tests.studentized(*tested.sum_and_freedom) for tests in found]
@@ -188,7 +188,7 @@ class Tests:
         axes = tuple(axis for tests in types for axis in tests.axes)
         of = np.cumsum([0, *(len(tests.axes) for tests in types)])[of_type] + parts
         sd, shares, values = (numbers[name] for name in ("sd", "redundancy", "values"))
-        freedom = math.inf if self._result.KNOWN else self._result.sum_and_freedom[1]
+        freedom = math.inf if self._result.known_weight else self._result.sum_and_freedom[1]
         detectable = minimal_detectable_error(sd, shares, math.sqrt(lambda0(dof=freedom)))
         statistic = types[0].statistic
         units = np.array([unit_written(axis.small) for axis in axes], dtype=object)

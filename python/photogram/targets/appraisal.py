@@ -82,7 +82,7 @@ def cross_validate(
             adjusted.append(_adjusted(result, mine & np.isin(corners.views, views[part]), cameras))
         a, b = (housing_of(each)[0] for each in adjusted)
         parts.append((tuple(views[pair[0]].tolist()), tuple(views[pair[1]].tolist())))
-        sums, freedoms = zip(*(each.result.sum_and_freedom for each in adjusted), strict=True)
+        sums, freedoms = zip(*(each.sum_and_freedom for each in adjusted), strict=True)
         pooled = sum(sums) / sum(freedoms), sum(freedoms)  # variance of unit weight, degrees of freedom
         tests.append(tuple(parts_agree(a, b, names, pooled)))
         housings.append((a, b))
@@ -97,7 +97,7 @@ def cross_validate(
 
 
 def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibrated:
-    given, restarted, priors = whole.calibration, whole.restarted(), whole.result.block.cameras
+    given, restarted, priors = whole.calibration, whole.restarted_calibration(), whole.block.cameras
     corners = given.corners.of_pictures(pictures)
     views = np.unique(given.corners.views[pictures])
     free = []  # unknown parameters are free until the first adjustment ends; the priors are added afterwards
@@ -122,12 +122,12 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
         motion=None if given.motion is None else np.asarray(given.motion)[views],
         regularise=None,
     )
-    result = adjust(part.block(), loss=cast("Loss | None", whole.result.options.loss))
+    result = adjust(part.block(), loss=cast("Loss | None", whole.options.loss))
     own = [priors[each] for each in cameras]
     sd = np.concatenate([each.deviations for each in own])
     if (np.isfinite(sd) & (sd > 0)).any():
         result = adjusted_again(part.block(own), result.options, result.state, threads=None)
-    return Calibrated(calibration=part, result=result)
+    return Calibrated.of(result, part)
 
 
 DISTANCE_FIGURES = 2  # significant digits of the median board distance

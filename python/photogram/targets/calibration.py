@@ -27,11 +27,11 @@ from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 from photogram.results.result import Result
 from photogram.results.snooping_options import SnoopOptions
+from photogram.results.snooping_result import Snooped
 from photogram.summaries import Brief, Rows, few
 from photogram.targets.board import Board
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corners import Corners
-from photogram.targets.findings import judged, with_unknown_weight
 from photogram.targets.housing import transformed
 from photogram.targets.motion import CLOCK, MAX_GAP_SECONDS, POWERS, dated, moved, moving, pictures_in_motion
 from photogram.targets.options import Regularisation, Shape, Synchronisation
@@ -410,17 +410,16 @@ class Calibration(Valued, Brief):
                 start, rounds = better, rounds + 1
             else:
                 break
-        messages = [*start.messages, *result.messages]
+        result = replace(result, messages=[*start.messages, *result.messages])
+        found = Calibrated.of(result, start, free if start.regularise else None)
         if start.sync == "offset":
-            messages += checked_clocks(Calibrated(calibration=start, result=result))
-        result = replace(result, messages=messages)
-        if start.sd0 is None:
-            result = with_unknown_weight(result)
-        before = free if start.regularise else None
-        return judged(Calibrated(calibration=start, result=result, unregularised=before))
+            found = replace(found, messages=[*result.messages, *checked_clocks(found)])
+        return found
 
-    def snoop(self, options: SnoopOptions | None = None, **changes: Any) -> Calibrated:
+    def snoop(self, options: SnoopOptions | None = None, **changes: Any) -> Snooped:
         """Remove gross errors one by one by data snooping, and adjust the rest.
+
+        The `result` is :class:`Calibrated`.
 
         Parameters
         ----------
@@ -442,7 +441,7 @@ class Calibration(Valued, Brief):
         assert isinstance(result, Result)
         rest = start.with_images_of(result.block)
         result = replace(result, messages=[*rest.messages, *result.messages])
-        return judged(Calibrated(calibration=rest, result=result, snooped=snooped))
+        return replace(snooped, result=Calibrated.of(result, rest))
 
 
 def simulate_corners(calibration: Calibration, seed: int = 1) -> Calibration:

@@ -6,8 +6,10 @@ It can contain an assessment: uncertainty maps, cross-validation and suggested v
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
+from dataclasses import fields
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import TYPE_CHECKING, Literal, Self, get_args
 
 import numpy as np
 
@@ -17,17 +19,16 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.attitudes import Attitudes
 from photogram.network.passages import Bend
 from photogram.network.trajectories import Clock
-from photogram.results.parts import AdjustedCamera, AdjustedUnknown
+from photogram.results.parts import AdjustedUnknown
 from photogram.results.result import Result
-from photogram.results.snooping_result import Snooped
-from photogram.show.methods import Documented, Judged
 from photogram.show.page import Document
-from photogram.statistics.verdict import Verdict
+from photogram.statistics.limits import GlobalTest
 from photogram.summaries import Rows
 from photogram.targets.motion import CLOCK
 from photogram.targets.vision import sensor_pose, sensor_steps, view_steps, vision_poses
 
 if TYPE_CHECKING:
+    from photogram.statistics.findings import Findings
     from photogram.targets import Calibration, Worth
     from photogram.targets.housing import Housing
 
@@ -39,55 +40,70 @@ STEPS = ("tx", "ty", "tz", "wx", "wy", "wz")  # R <- Exp(w) R, t <- t + dt in vi
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Calibrated(Judged, Documented):
-    """Adjusted calibration of K cameras in V views of a board of n points.
+class Calibrated(Result):
+    """Adjusted block of a calibration: K cameras in V views of a board of n points.
 
     Attributes
     ----------
     calibration
         Calibration input, without removed outliers.
-    result
-        The adjusted block: residuals, redundancy numbers, tests, the verdict.
     unregularised
         Adjustment without camera priors, if any, which shows their effect.
-    snooped
-        Result of data snooping, if used; `result` is the adjustment of the rest.
     worth
         Assessment with uncertainty maps and cross-validation for reports.
+    need
+        Largest accepted standard deviation of projection, pixels; None: any.
     """
 
     calibration: Calibration
-    result: Result
     unregularised: Result | None = None
-    snooped: Snooped | None = None
     worth: Worth | None = None
+    need: float | None = None
+
+    @classmethod
+    def of(cls, result: Result, calibration: Calibration, unregularised: Result | None = None) -> Self:
+        """Return the adjusted block of a calibration with its board."""
+        adjusted = {each.name: getattr(result, each.name) for each in fields(Result)}
+        return cls(**adjusted, calibration=calibration, unregularised=unregularised)
+
+    def with_worth(self, worth: Worth, need: float | None = None) -> Self:
+        """Return the calibration with an assessment, which its verdict and document contain."""
+        found = copy(self)  # with all covariances that have been computed
+        vars(found).pop("verdict", None)
+        vars(found).update(worth=worth, need=need)
+        return found
 
     def brief(self) -> tuple[str, Rows]:
         """Return a short summary of the adjustment."""
-        title, rows = self.result.brief()
+        title, rows = super().brief()
         return title, [*self.calibration.brief()[1], *rows]
 
     def document(self) -> Document:
         """Return the document with verdict, board, views and block."""
         from photogram.targets.page import calibration_page
 
-        return calibration_page(self)
+        return calibration_page(self, super().document())
 
     @property
-    def verdict(self) -> Verdict:
-        """Verdict on the usability of the result, with reasons."""
-        return self.result.verdict
+    def known_weight(self) -> bool:
+        """Whether the standard deviation of corners is given."""
+        return self.calibration.sd0 is not None
 
     @property
-    def cameras(self) -> tuple[AdjustedCamera, ...]:
-        """K adjusted cameras with their cofactors."""
-        return self.result.cameras
+    def global_test(self) -> GlobalTest | None:
+        """The test of all residuals; None if the standard deviation of corners is unknown."""
+        return super().global_test if self.known_weight else None
+
+    def _findings(self) -> Findings:
+        from photogram.targets.findings import calibration_findings
+
+        return calibration_findings(self, super()._findings())
 
     @cached_property
     def sensors(self) -> Floats:
         """(K, 4, 4) adjusted: camera 0 -> camera k; the identity for separate cameras."""
         found = np.tile(np.eye(4), (len(self.cameras), 1, 1))
-        for each in self.result.unknowns:
+        for each in self.unknowns:
             if each.kind == "sensor":
                 found[self._numbers[each.name]] = sensor_pose(each.position, each.attitude)
         return found
@@ -109,40 +125,40 @@ class Calibrated(Judged, Documented):
     @cached_property
     def poses(self) -> Floats:
         """(V, 4, 4) adjusted: board -> camera 0, or the camera of unsynchronised images."""
-        rows, result = self.photos, self.result
-        attitudes = Attitudes.of("omega_phi_kappa", result.photo_attitudes[rows])
-        return vision_poses(result.photo_positions[rows], attitudes)
+        rows = self.photos
+        attitudes = Attitudes.of("omega_phi_kappa", self.photo_attitudes[rows])
+        return vision_poses(self.photo_positions[rows], attitudes)
 
     @cached_property
     def picture_poses(self) -> Floats:
         """(P, 4, 4) adjusted: board -> the camera of each image, at its time."""
-        own, result = slice(len(self.calibration.corners.pictures)), self.result
-        attitudes = Attitudes.of("omega_phi_kappa", result.photo_attitudes[own])
-        return vision_poses(result.photo_positions[own], attitudes)
+        own = slice(len(self.calibration.corners.pictures))
+        attitudes = Attitudes.of("omega_phi_kappa", self.photo_attitudes[own])
+        return vision_poses(self.photo_positions[own], attitudes)
 
     @property
     def offsets(self) -> dict[str, AdjustedUnknown]:
         """Adjusted clock offsets between cameras, by camera name, in seconds."""
-        clocks = [each for each in self.result.unknowns if each.kind == Clock.KIND]
+        clocks = [each for each in self.unknowns if each.kind == Clock.KIND]
         return {each.name.removeprefix(CLOCK): each for each in clocks}
 
     @property
     def points(self) -> Floats:
         """(n, 3) adjusted points of the board; nominal for points without observations."""
-        found, board = self.result.point_positions, self.calibration.board
+        found, board = self.point_positions, self.calibration.board
         given = board.places if self.bend is None else board.bent(*self.bend.position[:2])
         return np.where(np.isnan(found), given, found)
 
     @property
     def bend(self) -> AdjustedUnknown | None:
         """Centre deflections of the board, if estimated."""
-        return next((each for each in self.result.unknowns if each.kind == Bend.KIND), None)
+        return next((each for each in self.unknowns if each.kind == Bend.KIND), None)
 
     def sensors_adjusted(self) -> list[int]:
         """Return the cameras with an adjusted sensor pose."""
-        return [self._numbers[each.name] for each in self.result.unknowns if each.kind == "sensor"]
+        return [self._numbers[each.name] for each in self.unknowns if each.kind == "sensor"]
 
-    def restarted(self) -> Calibration:
+    def restarted_calibration(self) -> Calibration:
         """Return the calibration with adjusted free values; other values are as given."""
         own, bend, found = self.calibration, self.bend, self.offsets
         late = np.array([found[each.name].values[0] if each.name in found else 0.0 for each in self.cameras])
@@ -205,7 +221,7 @@ class Calibrated(Judged, Documented):
             if not isinstance(each, int):
                 own[:, columns] = own[:, columns] @ each
             start = columns.stop
-        return self.result.covariances().combined(own, wanted) / self.result.covariance_scale
+        return self.covariances().combined(own, wanted) / self.covariance_scale
 
     def _selected(self, parts: Sequence[Part]) -> Chosen:
         names: list[str] = []
@@ -222,7 +238,7 @@ class Calibrated(Judged, Documented):
     def _cameras(self) -> Chosen:
         names: list[str] = []
         selections: list[tuple[str, list[str]]] = []
-        for each, given in zip(self.cameras, self.result.block.cameras, strict=True):
+        for each, given in zip(self.cameras, self.block.cameras, strict=True):
             knots = [knot.name for knot in given.knot_unknowns]
             own = each.names + (given.knot_names if knots else ())
             names += [f"{each.name} {name}" for name in own]
@@ -238,11 +254,11 @@ class Calibrated(Judged, Documented):
     def _board(self) -> Chosen:
         if self.bend is not None:
             return ["bend_x", "bend_y"], [("unknown", [self.bend.name])], [2]
-        seen = np.flatnonzero(self.result.used_points).tolist()
+        seen = np.flatnonzero(self.used_points).tolist()
         own = [self.calibration.board.names[row] for row in seen]
         return [f"{name}.{axis}" for name in own for axis in "xyz"], [("point", own)], [3 * len(own)]
 
     def _views(self) -> Chosen:
-        photos = [self.result.block.photo_ids[row] for row in self.photos.tolist()]
+        photos = [self.block.photo_ids[row] for row in self.photos.tolist()]
         names = [f"view {view} {step}" for view in range(len(photos)) for step in STEPS]
         return names, [("step", photos)], [view_steps(pose) for pose in self.poses]

@@ -64,7 +64,7 @@ FILE = "cameras_covariance.json"
 def cameras_covariance(calibrated: Calibrated) -> bytes:
     """Return a covariance file of camera parameters, then dt, w of sensors."""
     names, cofactors = calibrated.cofactors(("cameras", "sensors"))
-    scale = calibrated.result.covariance_scale
+    scale = calibrated.covariance_scale
     return json.to_json(
         {
             "kind": "covariance of cameras",

@@ -228,7 +228,7 @@ def plot_board_residuals(calibrated: Calibrated) -> Plot:
         The adjusted calibration.
     """
     corners, places = calibrated.calibration.corners, calibrated.points
-    found = group_statistics(calibrated.result, corners.point[corners.use], len(places))
+    found = group_statistics(calibrated, corners.point[corners.use], len(places))
     mean, seen = found.mean, np.isfinite(found.mean).all(axis=1)
     marked = np.asarray((np.abs(found.tests) > CRITICAL_TEST_VALUE).any(axis=1))
     unit = calibrated.calibration.board.unit
@@ -250,7 +250,7 @@ def plot_poorest_views(calibrated: Calibrated) -> Plot:
     calibrated
         The adjusted calibration.
     """
-    corners, result = calibrated.calibration.corners, calibrated.result
+    corners, result = calibrated.calibration.corners, calibrated
     picture = corners.picture[corners.use]
     rms = group_statistics(result, picture, len(corners.pictures)).rms
     worst = np.argsort(-np.nan_to_num(rms), kind="stable")[:VIEWS_DRAWN].tolist()

@@ -5,20 +5,16 @@ Views of the board are described by covered image parts, distance and tilt.
 
 from __future__ import annotations
 
-from copy import copy
-from dataclasses import fields, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.knots import KNOTTED
-from photogram.results.findings import block_findings
 from photogram.results.result import Result
 from photogram.statistics.findings import Findings, Systematic
-from photogram.statistics.limits import GlobalTest
-from photogram.statistics.verdict import verdict
 from photogram.statistics.weight_rules import LARGEST_FACTOR
 from photogram.targets.cross_validation import MIN_PROBABILITY, CrossValidation
 from photogram.targets.first_camera import WIDEST, from_axis
@@ -28,7 +24,7 @@ from photogram.targets.vision import rays
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
-    from photogram.targets import Calibrated, Worth
+    from photogram.targets import Calibrated
 
 MIN_TILT_DEG, MIN_TILTED_VIEWS = 15.0, 3  # separate focal length and distance
 MIN_DISTANCE_RATIO = 1.3  # ratio of farthest and nearest view
@@ -108,41 +104,29 @@ def showings(calibrated: Calibrated) -> list[Showing]:
 FREE_PARAMETERS_OF_LENS = {"opencv8": 12, "opencv12": 16, KNOTTED: 10**6}
 
 
-def judged(calibrated: Calibrated, worth: Worth | None = None, need: float | None = None) -> Calibrated:
-    """Return a calibration with its verdict in all parts, including uncertainty maps.
-
-    `need` is the largest accepted standard deviation of projection, px.
-    """
-    shortfall = None
+def calibration_findings(calibrated: Calibrated, found: Findings) -> Findings:
+    """Return the findings of a block with those of its board, views and assessment."""
+    worth, need, shortfall = calibrated.worth, calibrated.need, found.shortfall
     if worth is not None and need is not None and not worth.largest <= need:
         worst = max(worth.maps, key=lambda found: found.largest)
         distance = distance_text(worst.distance, worst.unit)
         fields = {"camera": worst.camera, "sd": worst.largest, "distance": distance, "need": need}
         shortfall = phrase("verdict.not-accurate-enough", **fields)
-    own = verdict(replace(_findings(calibrated, worth), shortfall=shortfall))
-    result, snooped = copy(calibrated.result), calibrated.snooped
-    vars(result)["verdict"] = own
-    if snooped is not None:
-        snooped = replace(snooped, result=copy(snooped.result))
-        vars(snooped.result)["verdict"] = own
-    return replace(calibrated, result=result, snooped=snooped, worth=worth)
-
-
-def _findings(calibrated: Calibrated, worth: Worth | None) -> Findings:
-    found = calibrated.result._findings()
     shown = showings(calibrated)
     cross = () if worth is None else worth.cross
     wrong = [_systematic(each) for each in cross if not each.explained]
     stiff = bool(wrong) or any(each.significant for each in found.systematic)
     other = _other_model(calibrated) if stiff else []
-    unknown = []
-    if isinstance(calibrated.result, UnknownWeight):
-        sd = calibrated.calibration.assumed * deviation_of_corners(calibrated.result)
-        unknown.append(phrase("advice.corner-sd", sd=float(sd)))
+    unknown, untested = [], found.untested
+    if not calibrated.known_weight:
+        sd = calibrated.calibration.assumed * deviation_of_corners(calibrated)
+        unknown, untested = [phrase("advice.corner-sd", sd=float(sd))], phrase("untested.corners")
     missing = [line for each in shown for line in each.next]
     agreeing = [f"{', '.join(each.cameras)}: {each.verdict}" for each in cross if each.explained]
     return replace(
         found,
+        shortfall=shortfall,
+        untested=untested,
         systematic=[*found.systematic, *wrong],
         remarks=[*(each.line for each in shown), *agreeing, *found.remarks],
         weigh=phrase("how.board"),
@@ -188,25 +172,6 @@ def _systematic(cross: CrossValidation) -> Systematic:
         level=MIN_PROBABILITY / len(cross.tests),
         large=cross.factor > LARGEST_FACTOR,
     )
-
-
-class UnknownWeight(Result):
-    """Result without a global test."""
-
-    KNOWN: ClassVar[bool] = False
-
-    @property
-    def global_test(self) -> GlobalTest | None:
-        """None: the standard deviation of corners is unknown."""
-        return None
-
-    def _findings(self) -> Findings:
-        return replace(block_findings(self), untested=phrase("untested.corners"))
-
-
-def with_unknown_weight(result: Result) -> Result:
-    """Return a copy of a result with unknown unit weight."""
-    return UnknownWeight(**{each.name: getattr(result, each.name) for each in fields(Result)})
 
 
 def deviation_of_corners(result: Result) -> float:

@@ -75,7 +75,7 @@ _PIXELS = (Axis.of("px", "px"),)
 
 def views(calibrated: Calibrated) -> list[Quantity]:
     """Return the views with images, corners, rms, redundancy, chi2, largest residual."""
-    corners, result = calibrated.calibration.corners, calibrated.result
+    corners, result = calibrated.calibration.corners, calibrated
     count, of_picture, use = corners.view_count, corners.views, corners.use
     view = of_picture[corners.picture[use]]
     found = group_statistics(result, view, count)
@@ -98,7 +98,7 @@ def views(calibrated: Calibrated) -> list[Quantity]:
 
 def outlying_images(calibrated: Calibrated) -> Bools:
     """Return (m,) the images that are outliers of the verdict."""
-    outliers = np.zeros(len(calibrated.result.residuals), dtype=bool)
+    outliers = np.zeros(len(calibrated.residuals), dtype=bool)
     for kind, places in calibrated.verdict.outlying.items():
         if isinstance(kind, Phrase) and kind.code in ("test.images", "test.image_coordinates"):
             outliers[[place[0] for place in places]] = True
@@ -120,7 +120,7 @@ def residual_groups(calibrated: Calibrated, by: Groups, camera: int = 0) -> list
     """
     one_of("by", by, get_args(Groups))
     names, group = _grouped(calibrated, by, camera)
-    found = group_statistics(calibrated.result, group, len(names))
+    found = group_statistics(calibrated, group, len(names))
     with np.errstate(invalid="ignore", divide="ignore"):
         sigma = np.sqrt(found.chi2 / found.redundancy)
     marked = np.abs(np.nan_to_num(found.tests)) > CRITICAL_TEST_VALUE
@@ -139,7 +139,7 @@ def residual_groups(calibrated: Calibrated, by: Groups, camera: int = 0) -> list
 
 def _grouped(calibrated: Calibrated, by: Groups, camera: int) -> tuple[list[str], Indices]:
     """Return group names, and (m,) the group of each image, or -1."""
-    corners, block = calibrated.calibration.corners, calibrated.result.block
+    corners, block = calibrated.calibration.corners, calibrated.block
     use = corners.use
     cameras = corners.cameras[corners.picture[use]]
     if by == "camera":
@@ -202,7 +202,7 @@ def corner_components(
     """
     for basis in by:
         one_of("by", basis, get_args(CornerBasis))
-    start = result.restarted()
+    start = result.restarted_calibration()
     if not any(each.knot_unknowns for each in start.cameras):
         start = start.replace(regularise=None)
     block = weighted_block(start)

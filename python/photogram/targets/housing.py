@@ -178,7 +178,7 @@ def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
             seen=_seen(calibrated, cameras, views),
             cofactors=_cofactors(calibrated, cameras, views, poses, by_board.shape[2]),
             weights=_weights(calibrated, cameras),
-            variance=calibrated.result.covariance_scale,
+            variance=calibrated.covariance_scale,
         )
     return made[cameras[0]], cameras.index(camera)
 
@@ -194,7 +194,7 @@ def housed_with(calibrated: Calibrated, camera: int) -> list[int]:
 def _board_rows(calibrated: Calibrated) -> list[int]:
     if calibrated.calibration.shape != "points":
         return []
-    return np.flatnonzero(calibrated.result.used_points).tolist()
+    return np.flatnonzero(calibrated.used_points).tolist()
 
 
 def _points_by_board(calibrated: Calibrated) -> Floats:
@@ -207,7 +207,7 @@ def _points_by_board(calibrated: Calibrated) -> Floats:
 
 
 def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> SeenCorners:
-    result, corners = calibrated.result, calibrated.calibration.corners
+    result, corners = calibrated, calibrated.calibration.corners
     block = result.block
     used = result.used_images & np.isin(corners.cameras[block.image_photos], cameras)
     used &= result.image_weights > 0
@@ -225,7 +225,7 @@ def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> SeenCor
 def _cofactors(
     calibrated: Calibrated, cameras: list[int], views: Indices, poses: Floats, board: int
 ) -> Floats:
-    given = calibrated.result.block.cameras
+    given = calibrated.block.cameras
     lengths = [len(each.names) + 2 * len(each.knot_unknowns) for each in given]
     starts = np.concatenate([[0], np.cumsum(lengths)])
     kept = [starts[each] + np.flatnonzero(unknown_of(calibrated.cameras[each].camera)) for each in cameras]
@@ -243,7 +243,7 @@ def _cofactors(
 
 
 def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
-    block, rows = calibrated.result.block, _board_rows(calibrated)
+    block, rows = calibrated.block, _board_rows(calibrated)
     blocks = []
     for number in cameras:
         camera = block.cameras[number]

@@ -290,7 +290,7 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
     if not fits:
         return None
     bend = calibrated.bend
-    variance = calibrated.result.variance_of_unit_weight or 1.0
+    variance = calibrated.variance_of_unit_weight or 1.0
     observed, indices = _observations(calibrated)
     estimated = set().union(*free)
     terms = bool(estimated - {"f", *CORE}) or any(each.given.knot_unknowns for each in calibrated.cameras)

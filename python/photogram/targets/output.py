@@ -164,7 +164,7 @@ def _opencv_camera(rig: Rig, row: int, lenses: list[Terms]) -> list[str]:
     lines += _matrix("distortion_coefficients", np.reshape(terms or [], (-1, 1)))
     if calibrated is not None:
         corners = calibrated.calibration.corners
-        squares = (calibrated.result.residuals**2).sum(axis=1)
+        squares = (calibrated.residuals**2).sum(axis=1)
         pictures = corners.picture[corners.use]
         own = np.flatnonzero(corners.cameras == row)
         mean = [squares[pictures == picture].mean() for picture in own if (pictures == picture).any()]

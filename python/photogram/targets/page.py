@@ -38,9 +38,8 @@ if TYPE_CHECKING:
 
 
 @np.errstate(over="ignore", invalid="ignore")
-def calibration_page(calibrated: Calibrated) -> Document:
-    """Return the report of a calibration for the browser."""
-    page = (calibrated.snooped or calibrated.result).document()
+def calibration_page(calibrated: Calibrated, page: Document) -> Document:
+    """Return the document of a calibration from the one of its block."""
     worth = calibrated.worth
     tables = [
         Table("splines", "Splined lenses", splines(calibrated), about=KNOTS),

@@ -35,8 +35,8 @@ def better_start(start: Calibration, result: Result) -> Calibration | None:
 
 def _in_motion(start: Calibration, result: Result) -> Calibration:
     """Return the calibration with motion from adjusted poses, if that changes it."""
-    ended = Calibrated(calibration=start, result=result)
-    again = ended.restarted().replace(motion=None)
+    ended = Calibrated.of(result, start)
+    again = ended.restarted_calibration().replace(motion=None)
     # Image positions with the new motion, everything else as adjusted.
     late = {name: each.values[0] for name, each in ended.offsets.items()}
     there = again.replace(
@@ -62,7 +62,7 @@ def checked_clocks(calibrated: Calibrated) -> list[Message]:
     v'v, weighted by the poses. Its standard deviation is too small as well.
     """
     messages = []
-    start, result = calibrated.calibration, calibrated.result
+    start, result = calibrated.calibration, calibrated
     corners, sd = start.corners, np.asarray(start.sd_offsets)
     shares = _shares(calibrated)
     for camera, each in enumerate(calibrated.cameras):
@@ -82,7 +82,7 @@ def checked_clocks(calibrated: Calibrated) -> list[Message]:
 
 def _shares(calibrated: Calibrated) -> Floats:
     """Return (2, V): expected squared speeds from pose errors, and observed ones."""
-    start, result = calibrated.calibration, calibrated.result
+    start, result = calibrated.calibration, calibrated
     steps = ("step", [result.block.photo_ids[row] for row in calibrated.photos.tolist()])
     joint = result.covariance([steps]) / result.covariance_scale
     count = len(calibrated.photos)

@@ -81,7 +81,7 @@ def board_fit(calibrated: Calibrated) -> BoardFit | None:
     The adjusted coordinates are fitted to the nominal ones, (x, y) = t + M (X, Y), with equal weights. With
     columns m, n of M the stretches are |m| - 1, |n| - 1 and m'n.
     """
-    result, board = calibrated.result, calibrated.calibration.board
+    result, board = calibrated, calibrated.calibration.board
     seen = np.flatnonzero(result.used_points)
     if calibrated.calibration.shape != "points" or len(seen) < 4:
         return None
@@ -161,8 +161,8 @@ _SPLINES = {
 def _from_prior(calibrated: Calibrated, number: int) -> int:
     of_knots = {id(each) for each in calibrated.cameras[number].given.knot_unknowns}
     hang = 0
-    block = calibrated.result.block
-    for kind in calibrated.result.kinds.values():
+    block = calibrated.block
+    for kind in calibrated.kinds.values():
         for row, own in zip(kind.rows.tolist(), kind.redundancy, strict=True):
             observation = block.observations[row]
             if not (isinstance(observation, Prior) and isinstance(observation.unknown, Knot)):

@@ -127,7 +127,7 @@ def plan_views(
     ]
     corners = np.bincount(found.calibration.corners.picture)[:, np.newaxis]
     return ViewPlan(
-        calibrated=replace(found, worth=Worth(maps=tuple(maps))),
+        calibrated=found.with_worth(Worth(maps=tuple(maps))),
         views=tuple(map(NewView, taken, corners, sds)),
         distance=worst,
         need=need,
@@ -155,7 +155,7 @@ def _predicted(
     poses = np.array([each.pose for each in views])
     start = Calibration(board=board, corners=corners, cameras=[camera], poses=poses, sd0=sd0)
     result = adjust(weighted_block(start), unit_variance="unity", covariance="verdict")
-    return Calibrated(calibration=start, result=result)
+    return Calibrated.of(result, start)
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
