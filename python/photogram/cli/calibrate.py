@@ -76,7 +76,7 @@ def calibrate(
         return
     if planned != Planned():
         raise misuse("--field, --focal, --away", "requires", options="--plan")
-    from photogram.targets import corner_components
+    from photogram.targets import Calibrated, corner_components
     from photogram.targets.page import drawings
 
     documents.declare(job, pictures=None)
@@ -86,14 +86,14 @@ def calibrate(
     with job.status("reading corners, finding first values") as progress:
         calibration = _read(path, seen, progress)
     job.remark(*calibration.messages)
+    snooped = None
     options: dict[str, Any] = {"loss": choices.get("loss"), "outliers": outliers, "threads": threads}
     with adjustment_status(job) as adjusting:
         if snoop:
             snooped = calibration.snoop(snooping, threads=threads, progress=adjusting)
-            found = snooped.result
-        else:
-            snooped, found = None, calibration.adjust(**options, progress=adjusting)
-    found = found.with_max_bias_ratio(choices.get("max_bias_ratio"))
+        adjusted = snooped.result if snooped else calibration.adjust(**options, progress=adjusting)
+    assert isinstance(adjusted, Calibrated)
+    found = adjusted.with_max_bias_ratio(choices.get("max_bias_ratio"))
     second = None if compare_with is None else lambda: _read(compare_with, seen).adjust(**options)
     found = _appraised(job, found, worth, need, second)
     snooped = snooped and replace(snooped, result=found)
