@@ -154,14 +154,8 @@ def test_variances_are_the_diagonal_of_the_reduction():
     for stage in (calibration.linear, calibration.nonlinear):
         reduction = Reduction.of(stage)
         rows = 2 * len(reduction.left)
-        rigid = np.zeros((rows, 3 * len(stage.cases)))
-        start = 0
-        for k, fit in enumerate(stage.cases):
-            own = slice(2 * start, 2 * (start + len(fit.residuals.points)))
-            start += len(fit.residuals.points)
-            rigid[own, 3 * k : 3 * k + 3] = reduction.rigid[own.start // 2 : own.stop // 2].reshape(-1, 3)
         left, right = (part.reshape(rows, -1) for part in (reduction.left, reduction.right))
-        dense = np.eye(rows) - rigid @ rigid.T - left @ right.T
+        dense = np.eye(rows) - left @ right.T
         assert reduction.variances().ravel() == pytest.approx((dense**2).sum(axis=1), abs=1e-12)
         assert reduction.squares_of_units() == pytest.approx((dense**2).sum(), rel=1e-12)
         # What it leaves of the residuals of its own stage is all of them.

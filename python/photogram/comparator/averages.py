@@ -4,12 +4,13 @@ Its unbiased form needs the residual effects of errors: traces of products with 
 memory. With polynomials, the stages of the report are rigid and linear parameters, polynomials, and rigid
 parameters again. This gives
 
-    R = (I - P) (I - B B^T) (I - P - L L^T) = I - P - U W^T.
+    R = (I - P P^T) (I - B B^T) (I - F F^T) = I - U W^T, U = [F, (I - P P^T) B], W = [F, (I - F F^T) B].
 
-P projects on rotation and translations of every case (three columns on the rows of one case each). L contains
-the linear parameters without their projection by P, B the polynomials (both orthonormal). Further, U = [L, (I
-- P) B], W = [L, (I - P - L L^T) B] and P U = P W = 0. Sums of squares require only small products of U, W and
-the errors of the grid.
+The columns of P are rotation and translations of every case, F = [P, L] those of P and the linear parameters,
+B the polynomials (all orthonormal). Sums of squares require only small products of U, W and the errors of the
+grid:
+
+    |A R E|^2 = |A E|^2 - 2 tr((A E)^T (A U) (E^T W)^T) + tr((A U)^T (A U) (E^T W)^T (E^T W)).
 """
 
 from __future__ import annotations
@@ -208,8 +209,8 @@ def text_grid_sigma(averages: PlateAverages) -> float:
 class GridSigma:
     """Grid and random standard deviations of a stage from unbiased sums of squares.
 
-    The adjustment is linear in the errors to first order: residuals are W times errors. These are grid
-    errors, rotated into the comparator, plus random errors. W gives the expectations of two sums of squares,
+    The adjustment is linear in the errors to first order: residuals are R times errors. These are grid
+    errors, rotated into the comparator, plus random errors. R gives the expectations of two sums of squares,
     for average residuals and for all residuals. They are linear in the variances and are equated with the
     sums. This accounts for rigid, linear and polynomial parameters with any placements and points. No matrix
     of the size of the readings is formed: see :mod:`photogram.comparator.averages`.
@@ -224,7 +225,7 @@ class GridSigma:
         rows = [grids[case.case.plate].rows_of(case.points) for case in cases]
         plates = dict.fromkeys(case.case.plate for case in cases)
         self.reduction = reduction = Reduction.of(stage)
-        self.errors = {plate: GridErrors.of(plate, rows, cases, stage) for plate in plates}
+        self.errors = {plate: GridErrors(plate, rows, cases, stage) for plate in plates}
         residuals = np.vstack([fit.residuals.comparator_um for fit in stage.cases])
         forms, squares = np.empty((len(plates) + 1, len(plates) + 1)), np.empty(len(plates) + 1)
         for row, errors in enumerate(self.errors.values()):
@@ -259,59 +260,45 @@ class GridSigma:
         return math.sqrt(squares / (2 * len(errors.counts)))
 
 
-@dataclass(frozen=True, eq=False)
 class GridErrors:
     """Coordinate errors e of one plate and their effect on residuals, v = E e."""
 
-    cases: Indices  # Indices of the cases on the plate
-    rows: Indices  # (n,) measured point and plate point of each non-zero block of E
-    columns: Indices
-    turns: Floats  # (n, 2, 2) blocks: rotations, mirrored if the comparator is left-handed
-    counts: Indices  # (l,) number of cases per point
-
-    @classmethod
-    def of(
-        cls,
+    def __init__(
+        self,
         plate: int,
         grid_rows: Sequence[Indices],
         cases: Sequence[PlacedCase],
         stage: CombinedLinear | CombinedPolynomial,
-    ) -> GridErrors:
-        """Return the errors of a plate from its cases and point rows."""
+    ) -> None:
         own = [k for k, case in enumerate(cases) if case.case.plate == plate]
-        starts = np.cumsum([0, *(len(case.points) for case in cases)])
-        points, columns = np.unique(np.concatenate([grid_rows[k] for k in own]), return_inverse=True)
-        turns = []
+        sizes = [len(case.points) for case in cases]
+        ends, turns = np.cumsum(sizes), []
         for k in own:
             turn = rotation_matrix(stage.cases[k].rotation_rad).T
-            turns.append(turn[:, ::-1] if cases[k].orientation.left_handed else turn)
-        return cls(
-            cases=np.array(own),
-            rows=np.concatenate([np.arange(starts[k], starts[k + 1]) for k in own]),
-            columns=columns,
-            turns=np.repeat(turns, [len(cases[k].points) for k in own], axis=0),
-            counts=np.bincount(columns, minlength=len(points)),
-        )
+            turns.append(exchanged(turn, cases[k].orientation.left_handed))
+        points = np.concatenate([grid_rows[k] for k in own])
+        order = np.argsort(points, kind="stable")
+        # Measured point of each non-zero block of E, sorted by plate point, and the first block of each point
+        self.rows = np.concatenate([np.arange(ends[k] - sizes[k], ends[k]) for k in own])[order]
+        self.starts = np.flatnonzero(np.diff(points[order], prepend=-1))
+        # (n, 2, 2) blocks: rotations, mirrored if the comparator is left-handed
+        self.turns = np.repeat(turns, [sizes[k] for k in own], axis=0)[order]
+        self.counts = np.diff([*self.starts, len(order)])  # Number of cases per point
 
     def gathered(self, values: Floats) -> Floats:
-        """Return E^T times columns: (measured points, 2, ...) to (plate points, 2, ...)."""
+        """Return E^T times columns: (measured points, 2, k) to (plate points, 2, k)."""
         turned = np.einsum("nji,nj...->ni...", self.turns, values[self.rows])
-        flat = turned.reshape(len(turned), -1)
-        sums = [np.bincount(self.columns, weights=column, minlength=len(self.counts)) for column in flat.T]
-        gathered = np.asarray(np.column_stack(sums), dtype=float)
-        return gathered.reshape(len(self.counts), *turned.shape[1:])
+        return np.asarray(np.add.reduceat(turned, self.starts))
 
     def average(self, values: Floats) -> Floats:
-        """Return columns rotated into the grid system and averaged by point, up to sign."""
+        """Return A times columns: rotated into the grid system and averaged by point, up to sign."""
         return np.asarray((self.gathered(values).T / self.counts).T)
 
 
 @dataclass(frozen=True, eq=False)
 class Reduction:
-    """Reduction R for m measured points in case order; columns have shape (m, 2)."""
+    """Reduction R = I - U W^T for m measured points in case order."""
 
-    starts: Indices  # First row of each case
-    rigid: Floats  # (m, 2, 3) the columns of P, each on the rows of its case
     left: Floats  # (m, 2, k) U and W
     right: Floats
 
@@ -319,71 +306,46 @@ class Reduction:
     def of(cls, stage: CombinedLinear | CombinedPolynomial) -> Reduction:
         """Return the reduction of reading errors to residuals of a stage."""
         places = [fit.residuals.xy_um for fit in stage.cases]
-        everywhere = np.vstack(places)
-        reduction = cls(
-            starts=np.cumsum([0, *(len(own) for own in places[:-1])]),
-            rigid=np.concatenate([_rigid(own) for own in places]),
-            left=np.empty((len(everywhere), 2, 0)),
-            right=np.empty((len(everywhere), 2, 0)),
-        )
+        everywhere, ends = np.vstack(places), np.cumsum([len(own) for own in places])
+        rigid = np.zeros((len(everywhere), 2, 3 * len(places)))
+        for k, (own, end) in enumerate(zip(places, ends.tolist(), strict=True)):
+            away = own - own.mean(axis=0)
+            x, y = away.T / np.linalg.norm(away)
+            columns = rigid[end - len(own) : end, :, 3 * k : 3 * k + 3]
+            columns[:, 0, 0] = columns[:, 1, 1] = 1 / math.sqrt(len(own))
+            columns[:, 0, 2], columns[:, 1, 2] = -y, x
         frame = Frame.of(everywhere)
         arguments = frame.arguments(everywhere)
-        # Columns of the scales and of the lack of orthogonality.
+        # Columns of the scales and of the lack of orthogonality
         scales = np.zeros((len(arguments), 2, 3))
         scales[:, 0, 0], scales[:, 1, 1], scales[:, 0, 2] = arguments[:, 0], arguments[:, 1], arguments[:, 1]
-        linear = np.linalg.qr(reduction.without_rigid(scales).reshape(-1, 3))[0].reshape(scales.shape)
+        linear = np.linalg.qr(_without(rigid, scales).reshape(-1, 3))[0].reshape(scales.shape)
+        first = np.concatenate([rigid, linear], axis=2)
         if isinstance(stage, CombinedLinear):
-            return cls(reduction.starts, reduction.rigid, linear, linear)
+            return cls(first, first)
         functions = np.linalg.qr(design(frame, everywhere))[0]
         both = np.einsum("nk,ij->nijk", functions, np.eye(2)).reshape(len(functions), 2, -1)
-        free = reduction.without_rigid(both)
-        return cls(
-            reduction.starts,
-            reduction.rigid,
-            np.concatenate([linear, free], axis=2),
-            np.concatenate([linear, free - linear @ _product(linear, both)], axis=2),
-        )
-
-    def without_rigid(self, values: Floats) -> Floats:
-        """Return (I - P) times columns (m, 2, k)."""
-        lengths = np.diff([*self.starts, len(values)])
-        parts = np.stack(
-            [np.add.reduceat(self.rigid[:, :, i, None] * values, self.starts) for i in range(3)], axis=2
-        ).sum(axis=1)
-        return np.asarray(values - np.einsum("nij,njk->nik", self.rigid, np.repeat(parts, lengths, axis=0)))
+        left, right = _without(rigid, both), _without(first, both)
+        return cls(np.concatenate([first, left], axis=2), np.concatenate([first, right], axis=2))
 
     def variances(self) -> Floats:
         """Return the diagonal of R R^T, (m, 2): residual variances for unit variance."""
-        inner = _product(self.right, self.right)
-        rigid = (self.rigid**2).sum(axis=2)
-        mixed = 2 * (self.left * self.right).sum(axis=2)
-        return np.asarray(1 - rigid - mixed + ((self.left @ inner) * self.left).sum(axis=2))
+        left = self.left @ _product(self.right, self.right) - 2 * self.right
+        return np.asarray(1 + (left * self.left).sum(axis=2))
 
     def squares_of_units(self) -> float:
         """Sum of squares of R: expected squares of residuals for unit variance."""
-        left, right = _product(self.left, self.left), _product(self.right, self.right)
-        trace = float((self.left * self.right).sum())
-        return 2 * len(self.left) - 3 * len(self.starts) - 2 * trace + float((left * right).sum())
+        return self.left[..., 0].size + _squares(self.left, self.right, self.left, self.right)
 
     def squares_of_errors(self, errors: GridErrors) -> float:
         """Sum of squares of R E."""
-        right = errors.gathered(self.right)
-        return (
-            2 * len(errors.rows)
-            - 3 * len(errors.cases)
-            - 2 * float((errors.gathered(self.left) * right).sum())
-            + float((_product(self.left, self.left) * _product(right, right)).sum())
-        )
+        left, right = errors.gathered(self.left), errors.gathered(self.right)
+        return 2 * len(errors.rows) + _squares(left, right, self.left, right)
 
     def averages_of_units(self, errors: GridErrors) -> float:
         """Sum of squares of A R, with A the average by point."""
         left, right = errors.average(self.left), errors.average(self.right)
-        rigid = (self.rigid[errors.rows] ** 2).sum(axis=(1, 2)) / errors.counts[errors.columns] ** 2
-        return (
-            float((2 / errors.counts).sum() - rigid.sum())
-            - 2 * float((left * right).sum())
-            + float((_product(left, left) * _product(self.right, self.right)).sum())
-        )
+        return float((2 / errors.counts).sum()) + _squares(left, right, left, self.right)
 
     def averages_of_errors(self, averaged: GridErrors, errors: GridErrors, *, lost: bool = False) -> float:
         """Sum of squares of A R E, A of one plate, E of the same or another.
@@ -391,26 +353,9 @@ class Reduction:
         With `lost`, sum of squares of I - A R E of one plate: the errors that averages do not show.
         """
         left, right = averaged.average(self.left), errors.gathered(self.right)
-        total = float((_product(left, left) * _product(right, right)).sum())
-        if averaged is not errors:
-            return total
-        # A E = I; A P E = X Y^T, three columns per case.
-        y = self._rigid_effects(errors)
-        x = np.asarray((y.T / errors.counts).T)
-        total += float((_product(x, x) * _product(y, y)).sum())
-        total += 2 * float((_product(x, left) * _product(y, right)).sum())
-        if lost:
-            return total
-        return total + 2 * len(errors.counts) - 2 * float((x * y).sum() + (left * right).sum())
-
-    def _rigid_effects(self, errors: GridErrors) -> Floats:
-        """Return E^T times the columns of P: (l, 2, 3 times the cases of the plate)."""
-        turned = np.einsum("nji,njk->nik", errors.turns, self.rigid[errors.rows])
-        case = np.searchsorted(self.starts, errors.rows, side="right") - 1
-        place = np.searchsorted(errors.cases, case)
-        effects = np.zeros((len(errors.counts), 2, len(errors.cases), 3))
-        effects[errors.columns, :, place] = turned
-        return effects.reshape(len(errors.counts), 2, -1)
+        if averaged is not errors or lost:  # A E = 0, or subtracted
+            return float((_product(left, left) * _product(right, right)).sum())
+        return 2 * len(errors.counts) + _squares(left, right, left, right)
 
 
 def _product(first: Floats, second: Floats) -> Floats:
@@ -418,8 +363,11 @@ def _product(first: Floats, second: Floats) -> Floats:
     return np.asarray(np.tensordot(first, second, axes=((0, 1), (0, 1))))
 
 
-def _rigid(xy_um: Floats) -> Floats:
-    """Return translations and rotation of one case as orthonormal columns (n, 2, 3)."""
-    x, y = (xy_um - xy_um.mean(axis=0)).T / np.linalg.norm(xy_um - xy_um.mean(axis=0))
-    even, zero = np.full_like(x, 1 / np.sqrt(len(x))), np.zeros_like(x)
-    return np.stack([np.column_stack([even, zero, -y]), np.column_stack([zero, even, x])], axis=1)
+def _without(basis: Floats, columns: Floats) -> Floats:
+    """Return columns without their projection on an orthonormal basis."""
+    return np.asarray(columns - basis @ _product(basis, columns))
+
+
+def _squares(one: Floats, other: Floats, left: Floats, right: Floats) -> float:
+    """Return the last two traces of |A R E|^2: of `one` and `other`, and of `left` and `right`."""
+    return float((_product(left, left) * _product(right, right)).sum() - 2 * (one * other).sum())
