@@ -60,8 +60,8 @@ def case_2_session():
 
 @cache
 def case_2():
-    """Return the calibration by case 2 alone, in the order of the listing."""
-    return calibrate(case_2_session(), Options(order="listing"))
+    """Return the calibration by case 2 alone."""
+    return calibrate(case_2_session())
 
 
 def printed_polynomial():

@@ -19,7 +19,7 @@ def chain():
     """Push case 2 through the printed parameters: flip, linear correction, polynomials, rigid fit."""
     placed = case_2().cases[0].placed
     corrected = printed_correction().apply(placed.means_um)
-    return fit_rigid(placed.points, corrected, placed.grid_um, lost=9 / 4, as_listed=True)
+    return fit_rigid(placed.points, corrected, placed.grid_um, lost=9 / 4)
 
 
 def test_feature_17_case_2_gives_figure_25(chain):
@@ -44,9 +44,7 @@ def test_case_2_gives_the_derived_reference(chain):
     assert np.abs(chain.residuals.comparator_um[order] - vectors).max() < 5.1e-5
     linear = document("derived_reference.json")["case2"]["with_fig30_linear_only"]["sum_vv_um2"]
     placed = case_2().cases[0].placed
-    fit = fit_rigid(
-        placed.points, printed_correction().linear(placed.means_um), placed.grid_um, as_listed=True
-    )
+    fit = fit_rigid(placed.points, printed_correction().linear(placed.means_um), placed.grid_um)
     assert fit.residuals.squares_um2 == pytest.approx(tuple(linear.values()), rel=1e-6)
 
 

@@ -83,7 +83,7 @@ def test_feature_08_degrees_of_freedom_of_the_listing():
     session = noisy(1, cases=4)
     text, listing = (
         calibrate(session, QUICK),
-        calibrate(session, Options(joint=False, pointing_dof="listing")),
+        calibrate(session, Options(joint=False, as_published=True)),
     )
     total = 4 * 128
     ratio = listing.pointing.total.variance_um2[0] / text.pointing.total.variance_um2[0]
@@ -102,7 +102,7 @@ def test_feature_08_the_text_is_unbiased_and_the_listing_is_not():
             points = np.repeat(np.arange(5), 3)
             cases.append(read_points(points, 1e5 + rng.standard_normal((15, 2))))
         text.append(pool_points(cases)[1].variance_um2[0])
-        listing.append(pool_points(cases, as_listed=True)[1].variance_um2[0])
+        listing.append(pool_points(cases, as_published=True)[1].variance_um2[0])
     assert np.mean(text) == pytest.approx(1.0, abs=4 * np.std(text) / math.sqrt(300))
     assert np.mean(listing) == pytest.approx(40 / 55, abs=4 * np.std(listing) / math.sqrt(300))
 

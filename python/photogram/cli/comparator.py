@@ -39,8 +39,7 @@ def comparator(
     documents: PageAndJson,
     pdf: bool = False,
     plots: Annotated[bool, typer.Option("--plots/--no-plots")] = True,
-    as_published: bool = False,
-    choices: Annotated[Mapping[str, Any], Changes(Options, "polynomial", "estimate_grid")],
+    choices: Annotated[Mapping[str, Any], Changes(Options, "as_published", "polynomial", "estimate_grid")],
     each_case: bool = False,
     date: str | None = None,
     strict: bool = False,
@@ -56,7 +55,7 @@ def comparator(
 
     left_handed = None if hand == "file" else hand == "left"
     sessions = read(paths or [], [find_grid(name) for name in grid or []], left_handed=left_handed)
-    options = replace(Options.as_published() if as_published else Options(), **choices)
+    options = Options(**choices)
     if each_case:
         sessions = [replace(session, plot_each_case=True) for session in sessions]
     calibrations = [calibrate(session, options) for session in sessions]

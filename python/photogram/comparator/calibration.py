@@ -124,6 +124,10 @@ class PlateResult:
     text_um: float
     unbiased_um: float
 
+    def sigma_um(self, *, as_published: bool) -> float:
+        """Return the standard deviation of a grid coordinate: unbiased, or of the listing."""
+        return self.listed.grid_um if as_published else self.unbiased_um
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Calibration(Documented, Judged):
@@ -211,8 +215,8 @@ class Calibration(Documented, Judged):
         return self.averages[self.last_stage]
 
     def sigma_grid_um(self, plate: int) -> float:
-        """Return the standard deviation of a grid coordinate that the options select."""
-        return _chosen_sigma(self.plates[plate], self.options)
+        """Return the standard deviation of a grid coordinate: unbiased, or as published."""
+        return self.plates[plate].sigma_um(as_published=self.options.as_published)
 
     def document(self) -> Document:
         """Return the document with analysis of variance, parameters, tests and plots."""
@@ -224,15 +228,6 @@ class Calibration(Documented, Judged):
         from photogram.comparator.document import comparator_findings
 
         return comparator_findings(self)
-
-
-def _chosen_sigma(result: PlateResult, options: Options) -> float:
-    of_choice = {
-        "unbiased": result.unbiased_um,
-        "text": result.text_um,
-        "listing": result.listed.grid_um,
-    }
-    return of_choice[options.grid_sigma]
 
 
 def needed_memory(pointings: int) -> int:
@@ -268,20 +263,19 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
     cases = [_case(case, session.grids[case.plate], options, messages) for case in session.cases]
     _check_handedness(session, cases)
     placed = [case.placed for case in cases]
-    listed = options.free_residuals == "report"
-    linear = combine_linear(placed, [case.linear for case in cases], as_listed=listed)
+    linear = combine_linear(placed, [case.linear for case in cases])
     nonlinear = None
     if options.polynomial:
         try:
-            nonlinear = combine_polynomial(placed, linear, as_listed=listed)
+            nonlinear = combine_polynomial(placed, linear)
         except AdjustmentError as error:
             what = phrase("comparators.combined")
             messages.append(Message(phrase("comparators.no-polynomials", what=what, reason=error.phrase)))
     pointing = _pointing(cases, options)
     averages = _averages(session, cases, linear, nonlinear)
     grid_um = _grid_sigma(session, averages["nonlinear" if nonlinear else "linear"], options)
-    free, truncated = [case.free for case in cases], options.nanometres == "truncated"
-    variance = analyse_variance(free, linear, nonlinear, pointing.total, grid_um, as_listed=truncated)
+    free, published = [case.free for case in cases], options.as_published
+    variance = analyse_variance(free, linear, nonlinear, pointing.total, grid_um, as_published=published)
     messages += [Message(phrase("comparators.negative", name=name)) for name in variance.negative]
     messages += plate_remarks(session, placed)
     joint = None
@@ -313,19 +307,18 @@ def calibrate(session: Session, options: Options | None = None) -> Calibration:
 
 def _case(case: Case, grid: Grid, options: Options, messages: list[Message]) -> CaseResult:
     closeouts, remarks = close_out(case)
-    placed, more = place_case(case, grid, as_listed=options.order == "listing")
+    placed, more = place_case(case, grid, as_published=options.as_published)
     messages += remarks + more
     points = placed.points, placed.means_um, placed.grid_um
-    free = fit_rigid(*points, as_listed=options.free_residuals == "report")
+    free = fit_rigid(*points)
     name, polynomial = phrase("comparators.case", case=case.number), None
     try:
         linear = fit_affine(*points)
     except AdjustmentError as error:
         raise case.place.error(phrase("error.at", what=name, message=error.phrase)) from None
     if options.polynomial:
-        listed = options.case_polynomial_residuals == "listing"
         try:
-            polynomial = single_polynomial(placed, linear, as_listed=listed)
+            polynomial = single_polynomial(placed, linear, as_published=options.as_published)
         except AdjustmentError as error:
             messages.append(Message(phrase("comparators.no-polynomials", what=name, reason=error.phrase)))
     return CaseResult(placed, closeouts, free, linear, polynomial)
@@ -345,9 +338,7 @@ def _check_handedness(session: Session, cases: Sequence[CaseResult]) -> None:
 
 def _pointing(cases: Sequence[CaseResult], options: Options) -> Pointing:
     def pooled(some: Iterable[CaseResult]) -> tuple[dict[int, Precision], Precision]:
-        return pool_points(
-            [case.placed.readings for case in some], as_listed=options.pointing_dof == "listing"
-        )
+        return pool_points([case.placed.readings for case in some], as_published=options.as_published)
 
     operators = dict.fromkeys(case.placed.case.operator for case in cases)
     by_operator = {
@@ -393,8 +384,8 @@ def _grid_sigma(session: Session, plates: Mapping[int, PlateResult], options: Op
     squares, points = 0.0, 0
     for plate, result in plates.items():
         sigma = session.grids[plate].sigma_um
-        if options.variance_grid == "computed" or sigma is None:
-            sigma = np.nan_to_num(_chosen_sigma(result, options))
+        if sigma is None:
+            sigma = np.nan_to_num(result.sigma_um(as_published=options.as_published))
         squares += len(result.averages.points) * sigma**2
         points += len(result.averages.points)
     return math.sqrt(squares / points)

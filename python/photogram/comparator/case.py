@@ -191,14 +191,17 @@ class PlacedCase:
         return pool(self.readings)
 
 
-def place_case(case: Case, grid: Grid, *, as_listed: bool = False) -> tuple[PlacedCase, list[Message]]:
-    """Reduce legs, group readings, form means, and detect the orientation of a case."""
+def place_case(case: Case, grid: Grid, *, as_published: bool = False) -> tuple[PlacedCase, list[Message]]:
+    """Reduce legs, group readings, form means, and detect the orientation of a case.
+
+    `as_published` orders the points like subroutine GROUP, which may exchange points.
+    """
     name = phrase("comparators.case", case=case.number)
     reduced, from_legs, messages = reduce_legs(case)
     if (count := len(np.unique(reduced.points))) < 3:
         too_few = phrase("comparators.few-points", count=count, least=LEAST_POINTS)
         raise case.place.error(phrase("error.at", what=name, message=too_few))
-    order = (group_as_listed if as_listed else group)(reduced.points)
+    order = (group_as_listed if as_published else group)(reduced.points)
     readings = read_points(reduced.points[order], reduced.xy_um[order])
     points = np.array([reading.point for reading in readings])
     means = np.array([reading.mean_um for reading in readings])

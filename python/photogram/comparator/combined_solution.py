@@ -60,9 +60,7 @@ class CombinedPolynomial:
         return self.sigma0_um**2 * self.polynomial.cofactors
 
 
-def combine_linear(
-    cases: Sequence[PlacedCase], fits: Sequence[AffineFit], *, as_listed: bool = False
-) -> CombinedLinear:
+def combine_linear(cases: Sequence[PlacedCase], fits: Sequence[AffineFit]) -> CombinedLinear:
     """Form the generalised weighted mean of the linear parameters of the cases.
 
     With the inverse cofactors P_j of case j: mean = (sum P)^-1 sum P x. Its sum of squares adds to the sums
@@ -84,40 +82,33 @@ def combine_linear(
     correction = Correction(scale_x, scale_y, lean)
     correction.covariance[:3, :3] = covariance
     lost = 0.5 * (3 + 3 / len(cases))
-    return CombinedLinear(
-        correction, sigma0, dof, covariance, _refit(cases, correction, lost, as_listed=as_listed)
-    )
+    return CombinedLinear(correction, sigma0, dof, covariance, _refit(cases, correction, lost))
 
 
-def _refit(
-    cases: Sequence[PlacedCase], correction: Correction, lost: float, *, as_listed: bool
-) -> tuple[RigidFit, ...]:
+def _refit(cases: Sequence[PlacedCase], correction: Correction, lost: float) -> tuple[RigidFit, ...]:
     return tuple(
-        fit_rigid(case.points, correction.apply(case.means_um), case.grid_um, lost=lost, as_listed=as_listed)
-        for case in cases
+        fit_rigid(case.points, correction.apply(case.means_um), case.grid_um, lost=lost) for case in cases
     )
 
 
-def single_polynomial(case: PlacedCase, fit: AffineFit, *, as_listed: bool = False) -> SinglePolynomial:
+def single_polynomial(case: PlacedCase, fit: AffineFit, *, as_published: bool = False) -> SinglePolynomial:
     """Fit polynomials to the linear residuals of one case (equations 59 to 61).
 
-    `as_listed` omits the sign change of the grid residuals.
+    `as_published` omits the sign change of the grid residuals.
     """
     parameters = fit.parameters
     linear = case.means_um @ parameters.linear_matrix.T
     polynomial = fit_polynomial(linear, fit.residuals.comparator_um)
     values = polynomial.evaluate(linear)
     comparator = fit.residuals.comparator_um - values
-    sign = 1.0 if as_listed else -1.0
+    sign = 1.0 if as_published else -1.0
     grid = sign * comparator @ rotation_matrix(parameters.rotation_rad).T
     return SinglePolynomial(
         polynomial, Residuals(case.points, linear + values, comparator, grid, float(COUNT))
     )
 
 
-def combine_polynomial(
-    cases: Sequence[PlacedCase], linear: CombinedLinear, *, as_listed: bool = False
-) -> CombinedPolynomial:
+def combine_polynomial(cases: Sequence[PlacedCase], linear: CombinedLinear) -> CombinedPolynomial:
     """Fit polynomials to the residuals of the combined linear parameters of all cases."""
     places = np.vstack([fit.residuals.xy_um for fit in linear.cases])
     residuals = np.vstack([fit.residuals.comparator_um for fit in linear.cases])
@@ -128,5 +119,5 @@ def combine_polynomial(
     covariance = linear.correction.covariance.copy()
     covariance[3:, 3:] = (sigma[0] ** 2 + sigma[1] ** 2) / 2 * polynomial.scaled_cofactors
     correction = replace(linear.correction, polynomial=polynomial, covariance=covariance)
-    fits = _refit(cases, correction, COUNT / len(cases), as_listed=as_listed)
+    fits = _refit(cases, correction, COUNT / len(cases))
     return CombinedPolynomial(correction, polynomial, sigma, dof, fits)

@@ -133,14 +133,12 @@ class RigidFit:
     residuals: Residuals
 
 
-def fit_rigid(
-    points: Indices, xy_um: Floats, grid_um: Floats, *, lost: float = RIGID_LOST, as_listed: bool = False
-) -> RigidFit:
+def fit_rigid(points: Indices, xy_um: Floats, grid_um: Floats, *, lost: float = RIGID_LOST) -> RigidFit:
     """Fit measured to grid coordinates of equal handedness, without scale.
 
     The least-squares similarity transformation has the same rotation as the rigid one. `lost` is the number
-    of unknowns per axis, for the standard errors. `as_listed` rotates residuals back with the unnormalised
-    cosine and sine of the similarity transformation, which changes them by some 1e-5.
+    of unknowns per axis, for the standard errors. As in the report, residuals are rotated back with the
+    unnormalised cosine and sine of the similarity transformation, which changes them by some 1e-5.
     """
     middle, grid_middle = xy_um.mean(axis=0), grid_um.mean(axis=0)
     d, g = xy_um - middle, grid_um - grid_middle
@@ -149,7 +147,7 @@ def fit_rigid(
     rotation = math.atan2(across, along)
     matrix = rotation_matrix(rotation)
     grid_residuals = d @ matrix.T - g
-    size = math.hypot(along, across) / float((d * d).sum()) if as_listed else 1.0
+    size = math.hypot(along, across) / float((d * d).sum())
     comparator = -size * grid_residuals @ matrix
     return RigidFit(
         rotation,

@@ -203,11 +203,11 @@ def pool(points: Iterable[PointReadings], *, listed_dof: int | None = None) -> P
 
 
 def pool_points(
-    cases: Sequence[Sequence[PointReadings]], *, as_listed: bool = False
+    cases: Sequence[Sequence[PointReadings]], *, as_published: bool = False
 ) -> tuple[dict[int, Precision], Precision]:
     """Pool each point over all cases (equations 25 to 27), then everything (28 to 32).
 
-    `as_listed` divides as in the listing. The divisor for a point is the number of its readings minus one.
+    `as_published` divides as in the listing. The divisor for a point is the number of its readings minus one.
     The divisor for all points is the number of readings minus the number of points.
     """
     by_number: dict[int, list[PointReadings]] = {}
@@ -216,7 +216,7 @@ def pool_points(
             by_number.setdefault(point.point, []).append(point)
 
     def dof(readings: list[PointReadings], means: int) -> int | None:
-        return sum(point.count for point in readings) - means if as_listed else None
+        return sum(point.count for point in readings) - means if as_published else None
 
     by_point = {number: pool(own, listed_dof=dof(own, 1)) for number, own in by_number.items()}
     everything = [point for own in by_number.values() for point in own]

@@ -80,19 +80,19 @@ def analyse_variance(
     pointing: Precision,
     grid_um: float,
     *,
-    as_listed: bool = False,
+    as_published: bool = False,
 ) -> VarianceAnalysis:
     """Split the total error into linear, nonlinear, grid, pointing and random parts.
 
     Without polynomials the nonlinear part is 0. `pointing` is the pooled precision of all pointings (equation
-    30). `as_listed` truncates the sigmas after the linear stage (SIGX, SIGY) to whole nanometres, as the
+    30). `as_published` truncates the sigmas after the linear stage (SIGX, SIGY) to whole nanometres, as the
     INTEGER array of cards in the listing.
     """
     before = _pooled(free, sum(len(fit.residuals.points) - 1.5 for fit in free))
     # nu of equation 57 counts both axes.
     after_linear = _pooled(linear.cases, linear.degrees_of_freedom / 2)
     after = AxisSigma(*nonlinear.sigma_um) if nonlinear else None
-    if as_listed:
+    if as_published:
         after_linear = after_linear.truncated()
     last = after or after_linear
     means = pointing.mean_sd_um if pointing.degrees_of_freedom > 0 else (0.0, 0.0)

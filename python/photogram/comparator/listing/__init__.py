@@ -61,7 +61,7 @@ def listing(calibration: Calibration, run_date: str = "") -> str:
         ]
     pages += _averages(calibration, "linear", "nonlinear")
     pages.append(summary_page(calibration))
-    ours = calibration.options.pages == "all"
+    ours = not calibration.options.as_published
     if ours:
         pages.append(tests_page(calibration))
     if ours and calibration.joint:

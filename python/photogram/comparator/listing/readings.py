@@ -47,7 +47,7 @@ def title_page(calibration: Calibration, run_date: str = "") -> list[str]:
         ("DATE OF RUN", run_date or "-"),
     ]
     lines += [f"  {name:<30}{value}" for name, value in settings]
-    if calibration.options.pages == "published":
+    if calibration.options.as_published:
         printed = [str(message.text).upper() for message in calibration.messages if message.code in PRINTED]
         return lines + (["", *(f"  {text}" for text in printed)] if printed else [])
     lines += ["", "PROBLEMS"]
