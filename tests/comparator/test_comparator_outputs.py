@@ -121,14 +121,14 @@ def _widths(panel):
 
 
 def test_feature_09_ellipses_of_operators_and_of_all_at_four_levels(full):
-    from photogram.comparator.pictures import sketches, total_ellipses
+    from photogram.comparator.pictures import grid_ellipses, sketches
 
     made = sketches(full)
     operators = list(full.pointing.operators)
     assert len(operators) == 2
     assert all(f"pointing-ellipses-operator-{operator}" in made for operator in operators)
     levels = [1.00, 1.18, 2.45, 3.03]
-    widths = _widths(total_ellipses(full).panels[0])
+    widths = _widths(grid_ellipses(full).panels[0])
     assert [own[0] / widths[0][0] for own in widths] == pytest.approx(levels)
     points = list(full.pointing.points)
     expected = [full.pointing.points[point].ellipse.major_um for point in points]

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from photogram.comparator.case import exchanged
 from photogram.comparator.listing.parameters import table_nodes
-from photogram.comparator.pointing import CONFIDENCE_FACTORS, Ellipse
+from photogram.comparator.pointing import CONFIDENCE_FACTORS
 from photogram.errors import InputError
 from photogram.show.sketch.marks import (
     Arrows,
@@ -27,6 +27,7 @@ from photogram.show.sketch.marks import (
     around,
     boxes,
     contours,
+    ellipse_axes,
 )
 from photogram.show.sketch.plot import Plot, side_by_side
 from photogram.show.style import BLUE, FAINT, INK, SOFT, VERMILION, round_length
@@ -51,8 +52,8 @@ def plotters(calibration: Calibration) -> dict[str, Callable[[], Plot]]:
     nonlinear, joint = calibration.nonlinear, calibration.joint
     made: dict[str, Callable[[], Plot]] = {
         "variance": partial(variance_bars, calibration),
-        "comparator-residuals": partial(comparator_vectors, calibration),
-        "grid-residuals": partial(grid_vectors, calibration),
+        "comparator-residuals": partial(residual_vectors, calibration, in_grid=False),
+        "grid-residuals": partial(residual_vectors, calibration, in_grid=True),
     }
     for plate in calibration.plates:
         made[f"average-residuals-{plate}"] = partial(average_vectors, calibration, plate)
@@ -69,118 +70,12 @@ def plotters(calibration: Calibration) -> dict[str, Callable[[], Plot]]:
         made[f"distorted-grid{ending}"] = partial(distorted_grid, calibration, polynomial, whose)
     made["pointing-ellipses"] = partial(pointing_ellipses, calibration)
     for operator in calibration.pointing.operators:
-        made[f"pointing-ellipses-operator-{operator}"] = partial(operator_ellipses, calibration, operator)
+        made[f"pointing-ellipses-operator-{operator}"] = partial(grid_ellipses, calibration, operator)
     return made | {
-        "pointing-ellipses-total": partial(total_ellipses, calibration),
+        "pointing-ellipses-total": partial(grid_ellipses, calibration),
         "pooled-ellipses": partial(pooled_ellipses, calibration),
         "residual-histogram": partial(residual_histogram, calibration),
     }
-
-
-def comparator_vectors(calibration: Calibration) -> Plot:
-    """Draw the final residuals of each case in the comparator system."""
-    residuals = [fit.residuals for fit in calibration.last_fits]
-    return _by_case(
-        calibration,
-        [own.xy_um for own in residuals],
-        [own.comparator_um for own in residuals],
-        OF_COMPARATOR,
-        "Residuals in the comparator system (to be added to the measurement)",
-    )
-
-
-def grid_vectors(calibration: Calibration) -> Plot:
-    """Draw the final residuals of each case in the plate system."""
-    hands = [case.placed.orientation.left_handed for case in calibration.cases]
-    return _by_case(
-        calibration,
-        [exchanged(case.placed.grid_um, hand) for case, hand in zip(calibration.cases, hands, strict=True)],
-        [
-            exchanged(fit.residuals.grid_um, hand)
-            for fit, hand in zip(calibration.last_fits, hands, strict=True)
-        ],
-        OF_PLATE,
-        "Residuals in the grid system (to be added to the grid)",
-    )
-
-
-def _by_case(
-    calibration: Calibration,
-    places: Sequence[Floats],
-    vectors: Sequence[Floats],
-    axes: tuple[str, str],
-    title: str,
-) -> Plot:
-    every = np.vstack(vectors)
-    scale = magnification(places[0] / MM, every)
-    # The longest residual of all panels defines their common scale.
-    key = scale, round_length(float(np.hypot(*every.T).max()))
-    limits = limits_of(np.vstack(places), every, scale)
-    panels = [
-        plan(
-            limits,
-            arrows(own, vector, scale),
-            f"case {case.number}, point {case.placed.orientation.nearest_point} nearest zero",
-            axes,
-            key,
-        )
-        for case, own, vector in zip(calibration.cases, places, vectors, strict=True)
-    ]
-    return side_by_side(panels, PANELS_ACROSS, 3.4, title)
-
-
-def average_vectors(calibration: Calibration, plate: int) -> Plot:
-    """Draw average residuals by comparator location and by grid point, on one scale."""
-    result = calibration.plates[plate]
-    averages = result.averages
-    grid = calibration.session.grids[plate]
-    own = grid.xy_um[grid.rows_of(averages.points)]
-    corrections = averages.corrections_um
-    together = np.vstack([corrections, averages.location_um])
-    scale = magnification(own / MM, together)
-    key = scale, round_length(float(np.hypot(*together.T).max()))
-    panels = [
-        plan(
-            limits_of(place.xy_um, place.residuals_um, scale),
-            arrows(place.xy_um, place.residuals_um, scale),
-            f"by comparator location, cases {', '.join(map(str, place.cases))}",
-            OF_COMPARATOR,
-            key,
-        )
-        for place in averages.by_location
-    ]
-    marks, title = arrows(own, corrections, scale, ACCENT), "by grid point: correction of the grid"
-    panels.append(plan(limits_of(own, corrections, scale), marks, title, OF_PLATE, key))
-    return side_by_side(
-        panels, PANELS_ACROSS, 4.2, f"Average residuals of {len(averages.cases)} cases, plate {plate}"
-    )
-
-
-def joint_grid(calibration: Calibration, plate: int) -> Plot:
-    """Draw the grid corrections of the joint adjustment with standard ellipses."""
-    joint = calibration.joint
-    if joint is None:
-        raise InputError(phrase("comparators.no-joint"))
-    own = joint.plates[plate]
-    grid = calibration.session.grids[plate]
-    places = grid.xy_um[grid.rows_of(own.points)]
-    ellipses = [Ellipse.of(c[0, 0], c[1, 1], c[0, 1]) for c in own.covariance_um2]
-    largest = max(ellipse.major_um for ellipse in ellipses)
-    # Space for an arrow and the ellipse at its end.
-    scale = magnification(places / MM, own.corrections_um * (1 + largest / np.abs(own.corrections_um).max()))
-    ends = places / MM + own.corrections_um * scale
-    semi_axes = scale * np.array([[each.major_um, each.minor_um] for each in ellipses])
-    turns = np.degrees([each.angle_rad for each in ellipses])
-    marks = [
-        *arrows(places, own.corrections_um, scale, ACCENT),
-        Ellipses(ends, semi_axes, turns, FAINT, 0.9, layer=1.5),
-        Names(places / MM, [str(point) for point in own.points.tolist()], [SOFT] * len(places), ends),
-    ]
-    reach = scale * largest
-    limits = around(np.vstack([places / MM, ends - reach, ends + reach]))
-    key = scale, round_length(float(np.hypot(*own.corrections_um.T).max()))
-    title = f"Corrections of grid {plate} by the joint adjustment, standard ellipses"
-    return Plot(6.2, 5.8, [plan(limits, marks, title, OF_PLATE, key)])
 
 
 MAIN, ACCENT = BLUE, VERMILION
@@ -188,6 +83,84 @@ MM = 1000.0
 PANELS_ACROSS = 4
 OF_PLATE = ("X of the plate, mm", "Y of the plate, mm")
 OF_COMPARATOR = ("x, mm", "y, mm")
+
+
+class Field(NamedTuple):
+    """Vectors at points (n, 2), micrometres, with title and names of the axes."""
+
+    title: str
+    axes: tuple[str, str]
+    places_um: Floats
+    vectors_um: Floats
+    colour: str = MAIN
+
+
+def vector_plot(fields: Sequence[Field], side: float, title: str, *, same_limits: bool = False) -> Plot:
+    """Draw vector fields side by side on one scale; the longest vector defines it."""
+    every = np.vstack([field.vectors_um for field in fields])
+    longest = float(np.hypot(*every.T).max(initial=0.0))
+    scale = scale_of(fields[0].places_um / MM, longest, 0.9)
+    panels = []
+    for field in fields:
+        places = field.places_um / MM
+        arrows = Arrows(places, field.vectors_um * scale, field.colour, 0.006)
+        marks = [Markers(places, ".", 5.0, FAINT, layer=1.0), arrows]
+        shown = fields if same_limits else [field]
+        ends = [each.places_um / MM + each.vectors_um * scale for each in shown]
+        limits = around(np.vstack([*(each.places_um / MM for each in shown), *ends]))
+        panels.append(plan(limits, marks, field.title, field.axes, (scale, round_length(longest))))
+    return side_by_side(panels, PANELS_ACROSS, side, title)
+
+
+def residual_vectors(calibration: Calibration, *, in_grid: bool) -> Plot:
+    """Draw the final residuals of each case in the system of the comparator or of the plate."""
+    fields = []
+    for case, fit in zip(calibration.cases, calibration.last_fits, strict=True):
+        title = f"case {case.number}, point {case.placed.orientation.nearest_point} nearest zero"
+        own, hand = fit.residuals, case.placed.orientation.left_handed
+        if in_grid:
+            vectors = exchanged(own.grid_um, hand)
+            fields.append(Field(title, OF_PLATE, exchanged(case.placed.grid_um, hand), vectors))
+        else:
+            fields.append(Field(title, OF_COMPARATOR, own.xy_um, own.comparator_um))
+    system, target = ("grid", "grid") if in_grid else ("comparator", "measurement")
+    title = f"Residuals in the {system} system (to be added to the {target})"
+    return vector_plot(fields, 3.4, title, same_limits=True)
+
+
+def average_vectors(calibration: Calibration, plate: int) -> Plot:
+    """Draw average residuals by comparator location and by grid point, on one scale."""
+    averages = calibration.plates[plate].averages
+    grid = calibration.session.grids[plate]
+    title, places = "by grid point: correction of the grid", grid.xy_um[grid.rows_of(averages.points)]
+    fields = [Field(title, OF_PLATE, places, averages.corrections_um, ACCENT)]
+    for place in averages.by_location:
+        title = f"by comparator location, cases {', '.join(map(str, place.cases))}"
+        fields.append(Field(title, OF_COMPARATOR, place.xy_um, place.residuals_um))
+    return vector_plot(fields, 4.2, f"Average residuals of {len(averages.cases)} cases, plate {plate}")
+
+
+def joint_grid(calibration: Calibration, plate: int) -> Plot:
+    """Draw the grid corrections of the joint adjustment with standard ellipses."""
+    joint = calibration.joint
+    if joint is None:
+        raise InputError(phrase("comparators.no-joint"))
+    own, grid = joint.plates[plate], calibration.session.grids[plate]
+    places = grid.xy_um[grid.rows_of(own.points)] / MM
+    semi_axes, turns = ellipse_axes(own.covariance_um2)
+    largest, longest = float(semi_axes.max()), float(np.hypot(*own.corrections_um.T).max())
+    # Space for an arrow and the ellipse at its end
+    scale = scale_of(places, longest * (1 + largest / float(np.abs(own.corrections_um).max())), 0.9)
+    ends = places + own.corrections_um * scale
+    marks = [
+        Markers(places, ".", 5.0, FAINT, layer=1.0),
+        Arrows(places, own.corrections_um * scale, ACCENT, 0.006),
+        Ellipses(ends, scale * semi_axes, turns, FAINT, 0.9, layer=1.5),
+        Names(places, [str(point) for point in own.points.tolist()], [SOFT] * len(places), ends),
+    ]
+    limits = around(np.vstack([places, ends - scale * largest, ends + scale * largest]))
+    title = f"Corrections of grid {plate} by the joint adjustment, standard ellipses"
+    return Plot(6.2, 5.8, [plan(limits, marks, title, OF_PLATE, (scale, round_length(longest)))])
 
 
 def plan(
@@ -202,28 +175,14 @@ def plan(
     return Panel(limits, marks, title, *axes, equal=True, bars=bars)
 
 
-def magnification(places_mm: Floats, vectors_um: Floats) -> float:
-    """Return plot millimetres per micrometre for vectors within 0.9 times the spacing."""
-    longest = float(np.hypot(*vectors_um.T).max(initial=0.0))
-    return 0.9 * spacing(places_mm) / longest if longest > 0 else 1.0
+def scale_of(places_mm: Floats, largest_um: float, part: float) -> float:
+    """Return plot millimetres per micrometre for a largest size within a part of the spacing.
 
-
-def spacing(places: Floats) -> float:
-    """Return the mean spacing of points that fill a square."""
-    extent = float(np.ptp(places, axis=0).max()) or 1.0
-    return extent / max(math.sqrt(len(places)) - 1, 1)
-
-
-def arrows(places_um: Floats, vectors_um: Floats, scale: float, colour: str = MAIN) -> list[Mark]:
-    """Return vectors at points, `scale` plot millimetres per micrometre."""
-    places = places_um / MM
-    dots = Markers(places, ".", 5.0, FAINT, layer=1.0)
-    return [dots, Arrows(places, vectors_um * scale, colour, 0.006)]
-
-
-def limits_of(places_um: Floats, vectors_um: Floats, scale: float) -> Floats:
-    """Return the limits of a map of vectors."""
-    return around(np.vstack([places_um / MM, places_um / MM + vectors_um * scale]))
+    The points fill a square.
+    """
+    extent = float(np.ptp(places_mm, axis=0).max()) or 1.0
+    spacing = extent / max(math.sqrt(len(places_mm)) - 1, 1)
+    return part * spacing / largest_um if largest_um > 0 else 1.0
 
 
 FINE = 121
@@ -286,47 +245,35 @@ STANDARD_PERCENT = 39  # Confidence of the standard ellipse, which the program d
 def pointing_ellipses(calibration: Calibration) -> Plot:
     """Draw the 39 percent ellipses of pointings at the measured points of each case."""
     places = [case.placed.means_um / MM for case in calibration.cases]
-    ellipses = [
-        [readings.precision.ellipse for readings in case.placed.readings] for case in calibration.cases
-    ]
-    largest = max((ellipse.major_um for own in ellipses for ellipse in own), default=0.0)
-    scale, limits = _scale(places[0], largest), around(np.vstack(places))
+    axes = [_axes([own.precision for own in case.placed.readings]) for case in calibration.cases]
+    largest = max(float(semi_axes.max()) for semi_axes, _ in axes)
+    scale, limits = scale_of(places[0], largest, 0.5), around(np.vstack(places))
     panels = [
         plan(
             limits,
-            _ellipses(at, own, {STANDARD_PERCENT: scale}),
+            _ellipses(at, *own, {STANDARD_PERCENT: scale}),
             f"case {case.number}, pooled {case.placed.precision.sd_point_um:.2f} µm",
             OF_COMPARATOR,
             (scale, round_length(largest)),
         )
-        for at, case, own in zip(places, calibration.cases, ellipses, strict=True)
+        for at, case, own in zip(places, calibration.cases, axes, strict=True)
     ]
     return side_by_side(
         panels, PANELS_ACROSS, 3.4, "Error ellipses of single pointings (39 percent; * no deviation)"
     )
 
 
-def operator_ellipses(calibration: Calibration, operator: int) -> Plot:
-    """Draw the pointing ellipses of an operator, by point, on the grid."""
-    points, total = calibration.pointing.operators[operator]
-    own = [case for case in calibration.cases if case.placed.case.operator == operator]
-    title = f"Pointings of operator {operator}, {len(own)} cases"
-    return _on_grid(calibration, own[0].placed.case.plate, points, total, title)
-
-
-def total_ellipses(calibration: Calibration) -> Plot:
-    """Draw the ellipses of all pointings, by point, on the grid of the first plate."""
-    pointing = calibration.pointing
-    title = f"All pointings, {len(calibration.cases)} cases, {len(pointing.operators)} operators"
-    plate = calibration.cases[0].placed.case.plate
-    return _on_grid(calibration, plate, pointing.points, pointing.total, title)
-
-
-def _on_grid(
-    calibration: Calibration, plate: int, points: Mapping[int, Precision], total: Precision, title: str
-) -> Plot:
-    """Draw the ellipses of points at all levels, in the axes of the comparator."""
-    grid = calibration.session.grids[plate]
+def grid_ellipses(calibration: Calibration, operator: int | None = None) -> Plot:
+    """Draw the pointing ellipses of an operator, or of all, by point on the grid at all levels."""
+    pointing, cases = calibration.pointing, calibration.cases
+    if operator is None:
+        points, total = pointing.points, pointing.total
+        title = f"All pointings, {len(cases)} cases, {len(pointing.operators)} operators"
+    else:
+        points, total = pointing.operators[operator]
+        cases = tuple(case for case in cases if case.placed.case.operator == operator)
+        title = f"Pointings of operator {operator}, {len(cases)} cases"
+    grid = calibration.session.grids[cases[0].placed.case.plate]
     place = dict(zip(grid.points.tolist(), grid.xy_um / MM, strict=True))
     known = {point: own for point, own in points.items() if point in place and own.degrees_of_freedom > 0}
     pooled = f"pooled {total.sd_point_um:.2f} µm" if total.degrees_of_freedom > 0 else "no repeated readings"
@@ -334,50 +281,51 @@ def _on_grid(
     if not known:
         return Plot(7.2, 7.0, [plan(around(np.array([*place.values()])), (), title, OF_PLATE)])
     places = np.array([place[point] for point in known])
-    ellipses = [own.ellipse for own in known.values()]
-    largest = max(CONFIDENCE_FACTORS.values()) * max(ellipse.major_um for ellipse in ellipses)
-    scale = _scale(places, largest)
+    axes = _axes([*known.values()])
+    largest = max(CONFIDENCE_FACTORS.values()) * float(axes[0].max())
+    scale = scale_of(places, largest, 0.5)
     scales = {percent: factor * scale for percent, factor in CONFIDENCE_FACTORS.items()}
-    marks, key = _ellipses(places, ellipses, scales), (scale, round_length(largest))
+    marks, key = _ellipses(places, *axes, scales), (scale, round_length(largest))
     return Plot(7.2, 7.0, [plan(around(places, 0.12), marks, title, OF_PLATE, key)])
 
 
 def pooled_ellipses(calibration: Calibration) -> Plot:
     """Draw the pooled ellipses of cases, operators and all pointings at all levels."""
     pointing = calibration.pointing
-    pooled = [
-        *((f"case {case.number}", case.placed.precision) for case in calibration.cases),
-        *((f"operator {operator}", total) for operator, (_, total) in pointing.operators.items()),
-        ("all", pointing.total),
-    ]
-    known = [(name, own) for name, own in pooled if own.degrees_of_freedom > 0]
-    largest = max((own.ellipse.major_um for _, own in known), default=1.0) or 1.0
+    pooled = {
+        **{f"case {case.number}": case.placed.precision for case in calibration.cases},
+        **{f"operator {operator}": total for operator, (_, total) in pointing.operators.items()},
+        "all": pointing.total,
+    }
+    known = {name: own for name, own in pooled.items() if own.degrees_of_freedom > 0}
+    axes = {name: _axes([own]) for name, own in known.items()}
+    largest = max((float(semi_axes.max()) for semi_axes, _ in axes.values()), default=1.0) or 1.0
     reach = 1.15 * largest * max(CONFIDENCE_FACTORS.values())
     limits = np.array([[-reach, -reach], [reach, reach]])
     panels = [
-        Panel(
+        plan(
             limits,
-            _ellipses(np.zeros((1, 2)), [own.ellipse], CONFIDENCE_FACTORS),
+            _ellipses(np.zeros((1, 2)), *axes[name], CONFIDENCE_FACTORS),
             f"{name}: {own.sd_point_um:.3f} µm",
-            "x, µm",
-            "y, µm",
-            equal=True,
+            ("x, µm", "y, µm"),
         )
-        for name, own in known
+        for name, own in known.items()
     ]
     title = f"Pooled error ellipses of a pointing ({LEVELS} percent, outward)"
     return side_by_side(panels or [Panel(limits)], PANELS_ACROSS, 2.6, title)
 
 
-def _scale(places_mm: Floats, largest_um: float) -> float:
-    """Return plot millimetres per micrometre for ellipses within half the spacing."""
-    return 0.5 * spacing(places_mm) / largest_um if largest_um > 0 else 1.0
+def _axes(precisions: Sequence[Precision]) -> tuple[Floats, Floats]:
+    """Return semi-axes (n, 2), um, and directions (n,), degrees, of pointings."""
+    ellipses = [own.ellipse for own in precisions]
+    return (
+        np.array([[each.major_um, each.minor_um] for each in ellipses]),
+        np.degrees([each.angle_rad for each in ellipses]),
+    )
 
 
-def _ellipses(places: Floats, ellipses: Sequence[Ellipse], scales: Mapping[int, float]) -> list[Mark]:
+def _ellipses(places: Floats, semi_axes: Floats, turns: Floats, scales: Mapping[int, float]) -> list[Mark]:
     """Return ellipses of several percentages, and a star for each missing one."""
-    semi_axes = np.array([[each.major_um, each.minor_um] for each in ellipses])
-    turns = np.degrees([each.angle_rad for each in ellipses])
     marks: list[Mark] = [Markers(places, "+", 4.0, FAINT)]
     for percent, scale in scales.items():
         colour, width = (MAIN, 1.0) if percent == STANDARD_PERCENT else (FAINT, 0.7)
