@@ -12,10 +12,10 @@ import numpy as np
 from photogram import comparator
 from photogram.comparator.calibration import adjusted_grid, corrected_grid
 from photogram.comparator.fits import fit_rigid
-from photogram.comparator.listing.parameters import combined_linear_page, tests_page, variance_lines
+from photogram.comparator.listing.parameters import combined_linear_page, variance_lines
 from photogram.comparator.simulation import simulated_years
 from photogram.show.cells import written
-from photogram.show.forms import table_text
+from photogram.show.forms import part_lines, table_text
 
 
 @cache
@@ -72,6 +72,12 @@ def grid_lines() -> list[str]:
     ]
 
 
+def tests_lines() -> list[str]:
+    """Show the tests of the polynomials and of the cases."""
+    tables = [calibration().document().table(key) for key in ("polynomial.terms", "cases")]
+    return [line for table in tables for line in ("", *part_lines(written(table)))][1:]
+
+
 def years_lines() -> list[str]:
     """Compare the simulated calibrations of the example of `comparator compare`."""
     found = comparator.compare(simulated_years())
@@ -84,7 +90,7 @@ BLOCKS = {
     "years": years_lines,
     "variance": lambda: variance_lines(calibration()),
     "linear": lambda: combined_linear_page(calibration())[2:],
-    "tests": lambda: tests_page(calibration())[2:],
+    "tests": tests_lines,
     "joint": joint_lines,
     "grid": grid_lines,
 }

@@ -474,7 +474,7 @@ def test_feature_23_the_listing_follows_the_pages_of_the_report():
         "CASE NUMBER 2 WITH ALL FINAL CORRECTIONS",
         "AVERAGE RESIDUALS AFTER APPLICATION OF ALL FINAL CALIBRATION CORRECTIONS",
         "CALIBRATION SUMMARY",
-        "JOINT ADJUSTMENT",
+        "Joint adjustment",
     ]
     places = [text.index(title) for title in titles]
     assert places == sorted(places)
@@ -511,7 +511,7 @@ def test_feature_23_published_pages_have_nothing_of_ours():
     session = noisy(2, left_handed=True, cases=3)
     own = listing(calibrate(session))
     published = listing(calibrate(session, Options(as_published=True)))
-    for words in ("PROBLEMS", "TESTS OF SIGNIFICANCE", "JOINT ADJUSTMENT"):
+    for words in ("PROBLEMS", "Terms and their tests", "Joint adjustment"):
         assert words in own
         assert words not in published
     assert "GRID CALIBRATION CORRECTIONS ARE VALID ONLY IF" in published

@@ -441,7 +441,7 @@ def adjusted_grid(calibration: Calibration, plate: int) -> Grid:
     """Return a plate of the joint adjustment of given coordinates and measurements."""
     assert calibration.joint is not None
     session, joint = calibration.session, calibration.joint.plates[plate]
-    sigma = math.sqrt(float(np.diagonal(joint.covariance_um2, axis1=1, axis2=2).mean()))
+    sigma = math.sqrt(float((joint.sd_um**2).mean()))
     corrections = joint.points, joint.corrections_um
     return with_corrections(session.grids[plate], *corrections, sigma, _occasion(session))
 

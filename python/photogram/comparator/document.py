@@ -14,6 +14,7 @@ from photogram.comparator.tables import (
     cases,
     coefficients,
     far_pointings,
+    grid_corrections,
     linear,
     outliers,
     terms,
@@ -53,7 +54,11 @@ def calibration_document(calibration: Calibration) -> Document:
     session, verdict, screening = calibration.session, calibration.verdict, calibration.screening
     own, nonlinear, tests = calibration.linear, calibration.nonlinear, calibration.polynomial_tests
     by_variance, of_cases = variance(calibration), cases(calibration)
-    polynomials = [terms(tests), coefficients(nonlinear)] if nonlinear and tests else []
+    polynomials = (
+        [terms(tests), coefficients(nonlinear.polynomial, nonlinear.sigma0_um**2)]
+        if nonlinear and tests
+        else []
+    )
     disagreeing = [outliers(screening), far_pointings(calibration.far_pointings)]
     date = f", {session.date}" if session.date else ""
     drawings = [
@@ -72,9 +77,7 @@ def calibration_document(calibration: Calibration) -> Document:
             Section("polynomials", "Polynomials", polynomials, POLYNOMIALS),
             Section.of(of_cases),
             Section("outliers", "Readings that do not agree", disagreeing),
-            Section(
-                "joint", "Joint adjustment", _joint(calibration.joint) if calibration.joint else [], JOINT
-            ),
+            Section("joint", "Joint adjustment", _joint(calibration), JOINT),
             Section.of(verdict_table(verdict)),
             remarks_section(calibration.messages),
         ],
@@ -96,8 +99,10 @@ def _highlights(calibration: Calibration) -> list[Fact]:
     return found + ([Fact.of("Joint adjustment, unit weight", joint.sigma0, decimals=4)] if joint else [])
 
 
-def _joint(joint: JointFit) -> list[Part]:
-    freedom = joint.degrees_of_freedom
+def _joint(calibration: Calibration) -> list[Part]:
+    if (joint := calibration.joint) is None:
+        return []
+    freedom, polynomial = joint.degrees_of_freedom, joint.correction.polynomial
     facts = [
         Fact.of(
             "Standard deviation of unit weight",
@@ -109,11 +114,22 @@ def _joint(joint: JointFit) -> list[Part]:
     ]
     for plate, own in joint.plates.items():
         how = "estimated" if own.estimated else "given"
+        if own.variance_ratio is not None:
+            how += f", variance ratio {own.variance_ratio:.3f}"
         facts.append(Fact.of(f"Grid {plate}, standard deviation", own.sigma_um, UM, how, figures=4))
-    return [
+    if calibration.joint_check is not None:
+        name, note = (
+            "Weighted mean of the report",
+            "largest difference from a joint adjustment that assumes the same",
+        )
+        facts.append(Fact.of(name, calibration.joint_check, "sd", note, figures=2))
+    parts: list[Part] = [
         Facts("Joint adjustment", facts),
         linear(joint.correction, joint.covariance, freedom, "joint_parameters"),
     ]
+    if calibration.nonlinear and polynomial:
+        parts.append(coefficients(polynomial, joint.sigma0**2, "joint_coefficients"))
+    return parts + [grid_corrections(plate, own) for plate, own in joint.plates.items()]
 
 
 def _members(calibration: Calibration) -> dict[str, Any]:

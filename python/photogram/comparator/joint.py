@@ -71,6 +71,11 @@ class JointPlate:
     # Test of the corrections against the a priori sd; None if it was estimated or fixed
     test: GlobalTest | None
 
+    @property
+    def sd_um(self) -> Floats:
+        """(l, 2) standard deviations of the adjusted coordinates."""
+        return np.asarray(np.sqrt(np.diagonal(self.covariance_um2, axis1=1, axis2=2)))
+
 
 @dataclass(frozen=True, eq=False)
 class JointFit:

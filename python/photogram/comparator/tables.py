@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.comparator.combined_solution import CombinedPolynomial
 from photogram.comparator.correction import Correction
 from photogram.comparator.fits import Decomposition, Residuals
+from photogram.comparator.joint import JointPlate
 from photogram.comparator.outliers import FarPointing, Screening
-from photogram.comparator.polynomial import TERMS
+from photogram.comparator.polynomial import TERMS, Polynomial
 from photogram.comparator.variance import PolynomialTest
 from photogram.show.page import about, probability_written
 from photogram.show.quantity import Axis, Quantity, Table, component, members, members_of_each, of_each
@@ -95,21 +95,34 @@ def terms(test: PolynomialTest) -> Table:
         of_each(found, "ratio", head="t", decimals=2),
         of_each(found, "probability", head="p", figures=2),
     ]
-    p = "" if test.probability is None else f", p = {probability_written(test.probability)}"
-    note = about("polynomial", ratio=test.ratio, first=first, second=second, p=p)
+    note = about("polynomial", ratio=test.ratio, first=first, second=second, p=_probability(test.probability))
     return Table("polynomial.terms", "Terms and their tests", columns, note)
 
 
-def coefficients(found: CombinedPolynomial) -> Table:
-    """Return the coefficients of the polynomials, arguments in metres."""
-    axis, sd = (Axis.of("", "m"),), np.sqrt(np.diag(found.covariance)).reshape(2, -1)
+def coefficients(polynomial: Polynomial, variance: float, key: str = "coefficients") -> Table:
+    """Return the coefficients of polynomials, arguments in metres, with a variance of unit weight (um^2)."""
+    axis, sd = (Axis.of("", "m"),), np.sqrt(variance * np.diag(polynomial.cofactors)).reshape(2, -1)
     columns = [_powers(TERMS)]
-    for name, values, own in zip("xy", found.polynomial.coefficients, sd, strict=True):
+    for name, values, own in zip("xy", polynomial.coefficients, sd, strict=True):
         columns += [
             Quantity(values, axis, "value", head=f"In {name}", figures=6),
             Quantity(own, axis, "deviation", head="sd"),
         ]
-    return Table("coefficients", "Coefficients, arguments in metres", columns)
+    return Table(key, "Coefficients, arguments in metres", columns)
+
+
+def grid_corrections(plate: int, own: JointPlate) -> Table:
+    """Return the corrections of a plate by the joint adjustment, in its axes."""
+    columns = [
+        Quantity(own.points, kind="name", head="Point"),
+        Quantity(own.corrections_um, XY, "difference", head="Correction {}", decimals=3),
+        Quantity(own.sd_um, XY, "deviation", head="sd {}", decimals=3),
+    ]
+    return Table(f"grid_corrections_{plate}", f"Corrections of grid {plate}", columns)
+
+
+def _probability(value: float | None) -> str:
+    return "-" if value is None else probability_written(value)
 
 
 def _powers(names: Sequence[str]) -> Quantity:
@@ -173,7 +186,11 @@ def cases(calibration: Calibration) -> Table:
     note, test = "", calibration.case_test
     if test is not None and test.f_max_limit is not None:
         code = f"cases.{'alike' if test.f_max <= test.f_max_limit else 'different'}"
-        note = about(code, value=test.f_max, limit=test.f_max_limit)
+        p = {
+            name: _probability(getattr(test, f"{name}_probability"))
+            for name in ("f_max", "bartlett", "levene")
+        }
+        note = about(code, **members(test, "f_max_limit", "degrees_of_freedom", value="f_max"), **p)
     return Table("cases", "Cases", columns, note)
 
 

@@ -10,10 +10,8 @@ from photogram.comparator.listing.parameters import (
     combined_linear_page,
     combined_polynomial_page,
     correction_table,
-    joint_page,
     residual_page,
     summary_page,
-    tests_page,
 )
 from photogram.comparator.listing.readings import averages_page, input_page, pointing_pages, title_page
 
@@ -33,7 +31,8 @@ STAGES = {
 def listing(calibration: Calibration, run_date: str = "") -> str:
     """Return the listing of a calibration, with form feeds between pages.
 
-    If the options request only the pages of the program, additional results are omitted.
+    The last page is the report with problems, tests and joint adjustment. If the options request the
+    published program, the listing only contains its pages.
 
     Parameters
     ----------
@@ -61,11 +60,8 @@ def listing(calibration: Calibration, run_date: str = "") -> str:
         ]
     pages += _averages(calibration, "linear", "nonlinear")
     pages.append(summary_page(calibration))
-    ours = not calibration.options.as_published
-    if ours:
-        pages.append(tests_page(calibration))
-    if ours and calibration.joint:
-        pages.append(joint_page(calibration, calibration.joint))
+    if not calibration.options.as_published:
+        pages.append(calibration.report().splitlines())
     return "\f\n".join("\n".join(line.rstrip() for line in page) + "\n" for page in pages)
 
 
