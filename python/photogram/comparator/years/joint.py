@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.comparator.case import exchanged
 from photogram.comparator.correction import PARAMETERS, parameters_of, partials_of
 from photogram.comparator.fits import rotation_matrix
@@ -50,14 +50,14 @@ class Together:
 class _Equations:
     """Linear equations of a calibration: v = A a + G dg + v0, with the weights of v.
 
-    `inverse` is the inverse of A' W A, and `mixed` is A' W G.
+    The unknowns a are all parameters, then the cases. `inverse` is the inverse of A' W A with zeros for fixed
+    parameters, and `mixed` is A' W G.
     """
 
     own: Floats
     grid: Floats
     rest: Floats
     weight: Floats
-    active: Indices
     inverse: Floats
     mixed: Floats
 
@@ -95,7 +95,7 @@ def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
         v, w = _residuals(each, own_back, steps, cofactors, shift)
         squares += float((each.weight * v**2).sum())
         # Every given coordinate is an observation and an unknown.
-        freedom += v.size - len(steps)
+        freedom += v.size - np.count_nonzero(each.inverse.diagonal())
         standardized.append(np.split(w, np.cumsum([len(case.points) for case in record.cases])[:-1]))
     test = global_test(squares, freedom)
     if test is None:
@@ -107,8 +107,8 @@ def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
     }
     return Together(
         parameters=[
-            parameters_of(record.correction) + _spread(each.active, steps[: len(each.active)])
-            for record, each, steps in zip(records, reduced, values, strict=True)
+            parameters_of(record.correction) + steps[:PARAMETERS]
+            for record, steps in zip(records, values, strict=True)
         ],
         covariance=scale * _covariance(reduced, back, cofactors),
         grids=grids,
@@ -149,8 +149,7 @@ def _equations(
     record: RecordedCalibration, grids: Mapping[int, Grid], starts: Mapping[int, int], size: int
 ) -> _Equations:
     correction, counts = record.correction, [len(case.points) for case in record.cases]
-    active = np.flatnonzero(np.diag(correction.covariance) > 0)
-    own = np.zeros((sum(counts), 2, len(active) + 3 * len(counts)))
+    own = np.zeros((sum(counts), 2, PARAMETERS + 3 * len(counts)))
     grid = np.zeros((sum(counts), 2, size))
     rest, variance = np.empty((sum(counts), 2)), np.empty((sum(counts), 2))
     for k, (case, end) in enumerate(zip(record.cases, np.cumsum(counts).tolist(), strict=True)):
@@ -165,12 +164,11 @@ def _equations(
         away = corrected - corrected.mean(axis=0)
         turned = np.stack([away @ turn[1], -away @ turn[0]], axis=1)[..., np.newaxis]
         back = -np.asarray(np.linalg.inv(turn @ by_reading))
-        own[readings, :, : len(active)] = back @ turn @ by_parameters[:, :, active]
-        columns = len(active) + 3 * k
-        own[readings, :, columns : columns + 1] = back @ turned
-        own[readings, :, columns + 1 : columns + 3] = back
+        own[readings, :, :PARAMETERS] = back @ turn @ by_parameters
+        columns = PARAMETERS + 3 * k
+        own[readings, :, columns : columns + 3] = np.concatenate([back @ turned, back], axis=2)
         places = 2 * (starts[case.plate] + points)[:, np.newaxis, np.newaxis] + np.arange(2)
-        to_grid = -back[:, :, ::-1] if case.left_handed else -back
+        to_grid = -exchanged(back, case.left_handed)
         grid[readings[:, np.newaxis, np.newaxis], np.arange(2)[:, np.newaxis], places] = to_grid
         misfit = corrected @ turn.T + case.translation_um - given
         rest[readings] = (back @ misfit[..., np.newaxis])[..., 0]
@@ -179,8 +177,11 @@ def _equations(
     weight, rows = 1 / variance.ravel(), 2 * len(rest)
     of_unknowns, of_grid = own.reshape(rows, -1), grid.reshape(rows, -1)
     weighted = (of_unknowns * weight[:, np.newaxis]).T
-    inverse = _inverse(weighted @ of_unknowns, record.name)
-    return _Equations(of_unknowns, of_grid, rest.ravel(), weight, active, inverse, weighted @ of_grid)
+    fixed = np.flatnonzero(correction.covariance.diagonal() <= 0)
+    free = np.delete(np.arange(of_unknowns.shape[1]), fixed)
+    inverse = np.zeros((of_unknowns.shape[1],) * 2)
+    inverse[np.ix_(free, free)] = _inverse((weighted @ of_unknowns)[np.ix_(free, free)], record.name)
+    return _Equations(of_unknowns, of_grid, rest.ravel(), weight, inverse, weighted @ of_grid)
 
 
 def _inverse(normal: Floats, what: str) -> Floats:
@@ -207,20 +208,10 @@ def _residuals(
     return v, w.reshape(-1, 2)
 
 
-def _spread(active: Indices, values: Floats) -> Floats:
-    full = np.zeros(PARAMETERS)
-    full[active] = values
-    return full
-
-
 def _covariance(reduced: Sequence[_Equations], back: Sequence[Floats], cofactors: Floats) -> Floats:
-    count = len(reduced)
-    blocks = np.zeros((count, count, PARAMETERS, PARAMETERS))
-    for i, first in enumerate(reduced):
-        own = first.active
-        blocks[i, i][np.ix_(own, own)] = first.inverse[: len(own), : len(own)]
-        common = back[i][: len(own)] @ cofactors
-        for j, second in enumerate(reduced):
-            other = second.active
-            blocks[i, j][np.ix_(own, other)] += common @ back[j][: len(other)].T
-    return blocks.transpose(0, 2, 1, 3)
+    by_grid = np.concatenate([own[:PARAMETERS] for own in back])
+    covariance = by_grid @ cofactors @ by_grid.T
+    for k, each in enumerate(reduced):
+        own = slice(k * PARAMETERS, (k + 1) * PARAMETERS)
+        covariance[own, own] += each.inverse[:PARAMETERS, :PARAMETERS]
+    return covariance.reshape(2 * (len(reduced), PARAMETERS))
