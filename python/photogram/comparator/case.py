@@ -94,9 +94,7 @@ def locations(grid: Grid, corner: int) -> Indices | None:
     """
     low, high = grid.xy_um.min(axis=0), grid.xy_um.max(axis=0)
     centred = grid.xy_um - (low + high) / 2
-    turned = centred
-    for _ in range(TURNS[corner] % 4):
-        turned = np.column_stack([-turned[:, 1], turned[:, 0]])
+    turned = centred @ np.linalg.matrix_power(np.array([[0, 1], [-1, 0]]), TURNS[corner] % 4)
     # Typical spacing; the least distance may belong to two points outside the pattern.
     spacing = math.sqrt(float((high - low).prod()) / len(centred))
     if spacing == 0:

@@ -142,21 +142,19 @@ class _Problem:
         polynomial: bool,
     ) -> None:
         self.cases, self.weights = cases, weights
-        plates = list(dict.fromkeys(case.case.plate for case in cases))
-        self.points_of = points_of = {
-            plate: np.unique(np.concatenate([case.points for case in cases if case.case.plate == plate]))
-            for plate in plates
-        }
-        counts = [len(points) for points in points_of.values()]
-        first = dict(zip(plates, np.cumsum([0, *counts]), strict=False))
-        self.grid_xy = np.vstack(
-            [grids[plate].xy_um[grids[plate].rows_of(points)] for plate, points in points_of.items()]
-        )
-        self.plate_of = np.repeat(plates, counts)
         self.measured_cases = np.repeat(np.arange(len(cases)), [len(case.points) for case in cases])
-        numbers = [(case.case.plate, case.points) for case in cases]
-        self.measured_points = np.concatenate(
-            [first[plate] + np.searchsorted(points_of[plate], points) for plate, points in numbers]
+        points = np.concatenate([case.points for case in cases])
+        self.plates = plates = list(dict.fromkeys(case.case.plate for case in cases))
+        rank = np.array([plates.index(case.case.plate) for case in cases])[self.measured_cases]
+        _, first, self.measured_points = np.unique(
+            rank * (points.max() + 1) + points, return_index=True, return_inverse=True
+        )
+        self.points, self.plate_of = points[first], np.array(plates)[rank[first]]
+        self.grid_xy = np.vstack(
+            [
+                grids[plate].xy_um[grids[plate].rows_of(self.points[self.plate_of == plate])]
+                for plate in plates
+            ]
         )
         self.counts = np.concatenate([case.counts for case in cases])
         self.frame = frame = Frame.of(np.vstack([fit.residuals.xy_um for fit in linear.cases]))
@@ -237,7 +235,7 @@ class _Problem:
             iterations=solution.iterations,
             random_um=random,
             cases=tuple(self._case(k, correction, scale) for k in range(len(self.cases))),
-            plates={plate: self._plate(plate, grid[plate], scale) for plate in self.points_of},
+            plates={plate: self._plate(plate, grid[plate], scale) for plate in self.plates},
         )
 
     def _case(self, k: int, correction: Correction, scale: float) -> JointCase:
@@ -262,7 +260,7 @@ class _Problem:
         rows, estimated = self.plate_of == plate, self.weights.grid_um[plate] is None
         ratio, test = self.grid_test(plate, sigma_um) if sigma_um > 0 else (None, None)
         return JointPlate(
-            points=self.points_of[plate],
+            points=self.points[rows],
             corrections_um=np.asarray(self.solution.grid_xy[rows] - self.grid_xy[rows]),
             covariance_um2=scale * self.solution.grid_cofactors[rows],
             sigma_um=sigma_um,

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TypeVar
 
 import numpy as np
 
@@ -27,7 +26,6 @@ from photogram.comparator.grid import Grid
 from photogram.comparator.joint import JointFit
 from photogram.comparator.readings import Case, Session
 from photogram.errors import AdjustmentError
-from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.show.quantity import members
@@ -240,8 +238,6 @@ def _outlier(
     return Outlier(case.number, point, (x, y), ratio, int(grid.points[nearest]) if near else None)
 
 
-Found = TypeVar("Found", FarPointing, Outlier)
-
 MAX_NAMED = 40  # largest outliers of each type
 
 
@@ -261,54 +257,40 @@ def problems(
         if result.test and (reason := result.test.problem()):
             text = phrase("comparators.grid-test", plate=plate, sd=result.sigma_um, reason=reason)
             messages.append(Message(text))
-    places = {
-        (case.number, point): place
-        for case in session.cases
-        for point, place in zip(reversed(case.points.tolist()), reversed(case.places), strict=True)
-    }
-    messages += _outliers(screening, cases, places)
+    by_point: dict[tuple[int, int], list[Outlier]] = {}
     numbers = {case.number: case for case in session.cases}
-    for pointing in _largest(far):
+    for outlier in screening.outliers:
+        by_point.setdefault((numbers[outlier.case].plate, outlier.point), []).append(outlier)
+    single: list[tuple[float, Message]] = []
+    for (plate, point), outliers in sorted(by_point.items()):
+        measured = [case.number for case in cases if case.case.plate == plate and point in case.points]
+        if len(outliers) > 1 and [outlier.case for outlier in outliers] == measured:
+            instead = {outlier.instead for outlier in outliers}
+            code = "wrong-point" if len(instead) > 1 or None in instead else "exchanged"
+            fields = {"plate": plate, "point": point, "instead": instead.pop()}
+            messages.append(Message(phrase(f"comparators.{code}", **fields)))
+            continue
+        for outlier in outliers:
+            code = "outlier" if outlier.instead is None else "outlier-exchanged"
+            fields = members(outlier, "case", "point", "ratio", "instead", distance="distance_um")
+            text = phrase(f"comparators.{code}", limit=screening.limit, **fields)
+            case = numbers[outlier.case]
+            place = case.places[case.points.tolist().index(point)]
+            single.append((outlier.ratio, place.message(text)))
+    pointings = []
+    for pointing in far:
         fields = members(pointing, "case", "point", "ratio", "limit")
         text = phrase("comparators.far-pointing", distance=abs(pointing.deviation_um), **fields)
-        messages.append(numbers[pointing.case].places[pointing.row].message(text))
-    return messages + _more(len(far), "comparators.more-pointings")
+        pointings.append((pointing.ratio, numbers[pointing.case].places[pointing.row].message(text)))
+    return [*messages, *_largest(single, "more-outliers"), *_largest(pointings, "more-pointings")]
 
 
-def _outliers(
-    screening: Screening, cases: Sequence[PlacedCase], places: Mapping[tuple[int, int], Place]
-) -> list[Message]:
-    plate_of = {case.number: case.case.plate for case in cases}
-    measured: dict[tuple[int, int], list[int]] = {}
-    for case in cases:
-        for point in case.points.tolist():
-            measured.setdefault((case.case.plate, point), []).append(case.number)
-    by_point: dict[tuple[int, int], list[Outlier]] = {}
-    for outlier in screening.outliers:
-        by_point.setdefault((plate_of[outlier.case], outlier.point), []).append(outlier)
-    messages, single = [], []
-    for (plate, point), outliers in sorted(by_point.items()):
-        if len(outliers) < 2 or [outlier.case for outlier in outliers] != measured[plate, point]:
-            single += outliers
-            continue
-        instead = {outlier.instead for outlier in outliers}
-        code = "wrong-point" if len(instead) > 1 or None in instead else "exchanged"
-        fields = {"plate": plate, "point": point, "instead": instead.pop()}
-        messages.append(Message(phrase(f"comparators.{code}", **fields)))
-    for outlier in _largest(single):
-        code = "outlier" if outlier.instead is None else "outlier-exchanged"
-        fields = members(outlier, "case", "point", "ratio", "instead", distance="distance_um")
-        text = phrase(f"comparators.{code}", limit=screening.limit, **fields)
-        messages.append(places[outlier.case, outlier.point].message(text))
-    return messages + _more(len(single), "comparators.more-outliers")
-
-
-def _largest(outliers: Sequence[Found]) -> list[Found]:
-    return sorted(outliers, key=lambda outlier: outlier.ratio, reverse=True)[:MAX_NAMED]
-
-
-def _more(count: int, code: str) -> list[Message]:
-    return [Message(phrase(code, count=count - MAX_NAMED))] if count > MAX_NAMED else []
+def _largest(messages: list[tuple[float, Message]], code: str) -> list[Message]:
+    """Return the messages with the largest ratios, and the number of others."""
+    ordered = [message for _, message in sorted(messages, key=lambda each: each[0], reverse=True)]
+    more = len(ordered) - MAX_NAMED
+    rest = [Message(phrase(f"comparators.{code}", count=more))] if more > 0 else []
+    return ordered[:MAX_NAMED] + rest
 
 
 def plate_remarks(session: Session, cases: Sequence[PlacedCase]) -> list[Message]:

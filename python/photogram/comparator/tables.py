@@ -134,22 +134,16 @@ def cases(calibration: Calibration) -> Table:
     """Return the cases with separate and combined adjustments."""
     found, last, combined = calibration.cases, calibration.last_fits, calibration.linear.cases
     heads = {"free": "Unit weight, free", "linear": "after linear", "nonlinear": "after polynomials"}
-    alone = [
-        members(case, free="free.residuals.sigma0_um", linear="linear.residuals.sigma0_um")
-        | {"nonlinear": case.polynomial and case.polynomial.residuals.sigma0_um}
-        for case in found
-    ]
-    together = [
-        {
-            "linear": one.residuals.sigma0_um,
-            "nonlinear": two.residuals.sigma0_um if calibration.nonlinear else None,
-        }
-        for one, two in zip(combined, last, strict=True)
-    ]
-    stages = [
-        {"combined_linear": one.residuals, "combined_last": two.residuals, **_stages(case)}
-        for case, one, two in zip(found, combined, last, strict=True)
-    ]
+    stages, alone, together = [], [], []
+    for case, one, two in zip(found, combined, last, strict=True):
+        own = {"free": case.free.residuals, "linear": case.linear.residuals}
+        if case.polynomial:
+            own["nonlinear"] = case.polynomial.residuals
+        of_last = two.residuals.sigma0_um if calibration.nonlinear else None
+        alone.append({stage: own[stage].sigma0_um if stage in own else None for stage in heads})
+        together.append({"linear": one.residuals.sigma0_um, "nonlinear": of_last})
+        own |= {"combined_linear": one.residuals, "combined_last": two.residuals}
+        stages.append({name: _residuals(residuals) for name, residuals in own.items()})
     columns = [
         of_each(found, "number", kind="name", member="case", head="Case"),
         of_each(found, "placed.case.plate", kind="name", member="plate", head="Plate"),
@@ -178,7 +172,7 @@ def cases(calibration: Calibration) -> Table:
         ),
         Quantity(alone, member="sigma0_um"),
         Quantity(together, member="sigma0_combined_um"),
-        Quantity([{name: _residuals(each) for name, each in own.items()} for own in stages], member="stages"),
+        Quantity(stages, member="stages"),
         Quantity([_linear(case) for case in found], member="linear"),
         Quantity([_polynomial(case) for case in found], member="polynomial"),
         Quantity([_closeouts(case) for case in found], member="closeouts"),
@@ -192,11 +186,6 @@ def cases(calibration: Calibration) -> Table:
         }
         note = about(code, **members(test, "f_max_limit", "degrees_of_freedom", value="f_max"), **p)
     return Table("cases", "Cases", columns, note)
-
-
-def _stages(case: CaseResult) -> dict[str, Residuals]:
-    found = {"free": case.free.residuals, "linear": case.linear.residuals}
-    return found | ({"nonlinear": case.polynomial.residuals} if case.polynomial else {})
 
 
 def _residuals(found: Residuals) -> dict[str, object]:
