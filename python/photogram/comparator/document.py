@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from photogram.comparator.calibration import adjusted_grid
 from photogram.comparator.joint import JointFit
 from photogram.comparator.pictures import plotters
 from photogram.comparator.pointing import Precision
@@ -14,9 +15,9 @@ from photogram.comparator.tables import (
     cases,
     coefficients,
     far_pointings,
-    grid_corrections,
     linear,
     outliers,
+    plate_points,
     terms,
     variance,
 )
@@ -129,7 +130,10 @@ def _joint(calibration: Calibration) -> list[Part]:
     ]
     if calibration.nonlinear and polynomial:
         parts.append(coefficients(polynomial, joint.sigma0**2, "joint_coefficients"))
-    return parts + [grid_corrections(plate, own) for plate, own in joint.plates.items()]
+    return parts + [
+        plate_points(adjusted_grid(calibration, plate), own.points, own.corrections_um, own.sd_um)
+        for plate, own in joint.plates.items()
+    ]
 
 
 def _members(calibration: Calibration) -> dict[str, Any]:

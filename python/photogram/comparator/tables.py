@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.comparator.correction import Correction
 from photogram.comparator.fits import Decomposition, Residuals
-from photogram.comparator.joint import JointPlate
+from photogram.comparator.grid import Grid
 from photogram.comparator.outliers import FarPointing, Screening
 from photogram.comparator.polynomial import TERMS, Polynomial
 from photogram.comparator.variance import PolynomialTest
@@ -111,14 +111,16 @@ def coefficients(polynomial: Polynomial, variance: float, key: str = "coefficien
     return Table(key, "Coefficients, arguments in metres", columns)
 
 
-def grid_corrections(plate: int, own: JointPlate) -> Table:
-    """Return the corrections of a plate by the joint adjustment, in its axes."""
+def plate_points(grid: Grid, points: Indices, corrections_um: Floats, sd_um: Floats) -> Table:
+    """Return points of an adjusted plate with corrections and standard deviations, in its axes."""
+    axes = tuple(Axis.of(name, "um") for name in "XY")
     columns = [
-        Quantity(own.points, kind="name", head="Point"),
-        Quantity(own.corrections_um, XY, "difference", head="Correction {}", decimals=3),
-        Quantity(own.sd_um, XY, "deviation", head="sd {}", decimals=3),
+        Quantity(points, head="Point"),
+        Quantity(grid.xy_um[grid.rows_of(points)], axes, "value", head="{}", decimals=3),
+        Quantity(corrections_um, axes, "deviation", head="Correction of {}", decimals=3),
+        Quantity(sd_um, axes, "deviation", head="sd {}", decimals=3),
     ]
-    return Table(f"grid_corrections_{plate}", f"Corrections of grid {plate}", columns)
+    return Table(f"grid-{grid.number}", f"Grid {grid.number}, {grid.adopted}", columns)
 
 
 def _probability(value: float | None) -> str:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.comparator.tables import UM, XY
+from photogram.comparator.tables import UM, XY, plate_points
 from photogram.history.document import history_document, history_findings
 from photogram.show.page import Document, Fact, Section, significant
 from photogram.show.quantity import Axis, Quantity, Table, members, of_each
@@ -52,20 +52,6 @@ def operators(comparison: Comparison) -> Table:
     return Table("operators", "Operators", columns)
 
 
-def points(comparison: Comparison, plate: int) -> Table:
-    """Return the points of a plate with their corrections and standard deviations."""
-    grid, together = comparison.grids[plate], comparison.together
-    axes = tuple(Axis.of(name, "um") for name in "XY")
-    sd = np.sqrt(np.diag(together.covariance_um2[plate])).reshape(-1, 2)
-    columns = [
-        Quantity(grid.points, head="Point"),
-        Quantity(grid.xy_um, axes, "value", head="{}", decimals=3),
-        Quantity(together.corrections_um[plate], axes, "deviation", head="Correction of {}", decimals=3),
-        Quantity(sd, axes, "deviation", head="sd {}", decimals=3),
-    ]
-    return Table(f"grid-{plate}", f"Grid {plate}, {grid.adopted}", columns)
-
-
 def comparison_findings(comparison: Comparison) -> Findings:
     """Return the tests of a comparison: all readings, and changes over time."""
     places = [
@@ -108,7 +94,10 @@ def comparison_document(comparison: Comparison) -> Document:
         }
         for plate, grid in comparison.grids.items()
     ]
-    pointing = operators(comparison)
+    pointing, plates = operators(comparison), []
+    for plate, grid in comparison.grids.items():
+        sd = np.sqrt(np.diag(together.covariance_um2[plate])).reshape(-1, 2)
+        plates.append(plate_points(grid, grid.points, together.corrections_um[plate], sd))
     return history_document(
         "Calibrations of comparators over years",
         calibrations(comparison),
@@ -127,7 +116,7 @@ def comparison_document(comparison: Comparison) -> Document:
             for plate, grid in comparison.grids.items()
         ],
         more=[
-            Section("grids", "Grids", [points(comparison, plate) for plate in comparison.grids], GRIDS),
+            Section("grids", "Grids", plates, GRIDS),
             Section("pointing", "Pointing of the operators, all calibrations", [pointing]),
         ],
         members={
