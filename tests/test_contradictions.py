@@ -39,8 +39,6 @@ def see(result, document=True):
 def no_pictures(monkeypatch):
     """Leave the pictures out that pages draw at once: they have no sentences."""
     monkeypatch.setattr("photogram.comparator.document.plotters", lambda _: {})
-    monkeypatch.setattr("photogram.stellar.document.plate_sketches", lambda _: {})
-    monkeypatch.setattr("photogram.stellar.night_document.night_sketches", lambda _: {})
 
 
 @pytest.fixture(scope="module")

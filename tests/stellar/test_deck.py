@@ -101,6 +101,6 @@ def test_command_line(tmp_path, monkeypatch):
     redundancy += sum(sum(star["redundancy"]) for star in document["stars"])
     assert redundancy == pytest.approx(728, abs=1e-6)
     written = {path.name for path in (tmp_path / "plate-calibrated").iterdir()}
-    assert {"listing.txt", "camera.json", "stars.png", "residuals.png", "distortion.png"} <= written
+    assert {"listing.txt", "camera.json", "residuals.png", "tests.png", "distortion.png"} <= written
     missing = CliRunner().invoke(app, ["stellar-camera", "nowhere"])
     assert missing.exit_code == 1

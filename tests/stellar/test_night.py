@@ -341,9 +341,9 @@ def test_command_line(tmp_path, monkeypatch):
         "camera-ros.yaml",
         "exposures.csv",
         "star-images.csv",
-        "stars.png",
         "residuals.png",
-        "histogram.png",
+        "tests.png",
+        "correlations.png",
         "distortion.png",
     }
     camera = BrownCamera.read(tmp_path / "night-calibrated" / "camera.json")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -45,7 +44,6 @@ def stellar_camera(
     from photogram.statistics.verdict import worst
     from photogram.stellar import calibrate
     from photogram.stellar.cameras import camera_document
-    from photogram.stellar.plots import plate_sketches
 
     problems, inputs = _read(deck)
     job.reads(*inputs)
@@ -64,7 +62,7 @@ def stellar_camera(
         files |= documents.inside(_files(result, mark))
         withheld = phrase("command.camera-withheld", names=list(cameras))
         files |= documents.unless_withheld(cameras, withheld, usable=result.verdict.usable)
-        files |= documents.pictures(partial(plate_sketches, result), mark)
+        files |= documents.pictures(result.document().plots, mark)
         files |= documents.page(job, result.document, mark)
         asked |= documents.as_json(result, mark)
     code = worst((result.verdict for result in results), strict=strict)
@@ -94,7 +92,6 @@ def exposures(
     from photogram.io.places import Place, at_place
     from photogram.stellar.night_calibration import calibrate_night
     from photogram.stellar.night_file import inputs, read_night
-    from photogram.stellar.plots import night_sketches
 
     job.reads(*inputs(night))
     documents = replace(documents, out=documents.out or Path(f"{night.stem}-calibrated"))
@@ -122,7 +119,7 @@ def exposures(
         result,
         tables,
         document=document,
-        plots=lambda: night_sketches(result),
+        plots=document.plots,
         beside=documents.unless_withheld(cameras, withheld, usable=result.verdict.usable),
         tables=("parameters",),
         remarks=result.messages,

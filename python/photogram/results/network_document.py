@@ -243,7 +243,7 @@ def _worst_table(tests: Tests, places: Indices) -> quantity.Table:
 PICTURES = ("network", "residuals", "redundancy", "tests", "correlations", "distortion", "features", "films")
 
 
-def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:
+def drawings(result: object, names: Sequence[str] = PICTURES) -> dict[str, Drawing]:
     """Return the drawings of a result by name; those without data are empty."""
     return {
         name: Drawing(
@@ -252,5 +252,5 @@ def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:
             about(f"{name}.caption"),
             partial(sketch_of, result, name),
         )
-        for name in PICTURES
+        for name in names
     }

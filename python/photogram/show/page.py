@@ -191,6 +191,10 @@ class Document:
     def drawings(self) -> list[Drawing]:
         return [part for part in self.parts(layers=True) if isinstance(part, Drawing)]
 
+    def plots(self) -> dict[str, Plot | None]:
+        """Return the plots of the drawings by name; None if there are no data."""
+        return {each.name.removeprefix("picture-"): each.sketch() for each in self.drawings()}
+
     def parts(self, *, layers: bool = False) -> list[Part]:
         """Return parts of sections and details; on request parts of layers."""
         parts = [part for section in (*self.sections, *self.details) for part in section.parts]

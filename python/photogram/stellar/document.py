@@ -32,9 +32,8 @@ from photogram.stellar.curves import (
     residual_classes,
 )
 from photogram.stellar.lens_choice import LEVEL, equal
-from photogram.stellar.night_document import pictures
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX
-from photogram.stellar.plots import plate_sketches
+from photogram.stellar.pictures import plate_drawings
 from photogram.stellar.printout import descriptors, have_common_weight
 from photogram.stellar.sky import Site
 
@@ -50,7 +49,7 @@ def plate_document(result: Result) -> Document:
     size = [Facts("Size", _much(result)), Facts("Fit", _good(result))]
     of_solution = _solution_sections(result)
     sections = [
-        Section("pictures", "Stars and residuals", [pictures(plate_sketches(result))]),
+        Section("pictures", "Stars and residuals", [plate_drawings(result)]),
         Section("size", "Size and fit", size),
         of_solution.pop("parameters"),
         of_solution.pop("derived"),

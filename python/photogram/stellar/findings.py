@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats
+from photogram.lazy_dataclasses import replace
 from photogram.statistics.findings import Findings, Tested
 from photogram.statistics.reliability import TESTABLE
 from photogram.stellar.parameters import SIGNIFICANT
@@ -15,33 +18,46 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.stellar import CalibratedNight, Result
 
-_PLACES = phrase("stars.places")
 _AXES = ("right ascension", "declination")
 
 
-def _testable(values: Floats, redundancy: Floats, unit: float) -> Floats:
-    return np.where(np.nan_to_num(redundancy) > TESTABLE, values * unit, np.nan)
+def _testable(values: Floats, redundancy: Floats) -> Floats:
+    return np.where(np.nan_to_num(redundancy) > TESTABLE, values, np.nan)
 
 
-def plate_tests(result: Result) -> list[Tested]:
-    """Return the tests of a plate: w for a given unit weight (option 14), else t."""
-    problem, solved, given = result.problem, result.solved, result.problem.options.mean_error
+def _sizes(tested: Tested) -> Tested:
+    return replace(tested, values=np.abs(tested.values))
+
+
+def _stars(values: Floats, redundancy: Floats, names: Sequence[str]) -> Tested:
+    def star(index: tuple[int, ...]) -> Phrase:
+        return phrase("stars.place", axis=_AXES[index[1]], star=names[index[0]])
+
+    return Tested(phrase("stars.places"), _testable(values, redundancy), star)
+
+
+def plate_standardized(result: Result, unit: float | None = None) -> list[Tested]:
+    """Return standardized residuals of a plate for a mean error of unit weight; None: the one in use."""
+    unit = unit or result.mean_error or math.nan
+    problem, solved = result.problem, result.solved
 
     def image(index: tuple[int, ...]) -> Phrase:
         star = problem.star_ids[problem.image_stars[index[0]]]
         point = problem.image_points[index[0]]
         return phrase("stars.plate-coordinate", axis="xy"[index[1]], point=point, star=star)
 
-    def star(index: tuple[int, ...]) -> Phrase:
-        return phrase("stars.place", axis=_AXES[index[1]], star=problem.star_ids[index[0]])
+    images = Tested(
+        phrase("stars.plate-coordinates"), _testable(solved.standardized / unit, solved.redundancy), image
+    )
+    return [images, _stars(solved.star_standardized / unit, solved.star_redundancy, problem.star_ids)]
 
-    unit = 1 / given if given else 1.0
-    images = np.abs(_testable(solved.standardized, solved.redundancy, unit))
-    stars = np.abs(_testable(solved.star_standardized, solved.star_redundancy, unit))
-    tests = [Tested(phrase("stars.plate-coordinates"), images, image), Tested(_PLACES, stars, star)]
-    if given:
-        return tests
-    return [each.studentized(sum(solved.sums), result.degrees_of_freedom) for each in tests]
+
+def plate_tests(result: Result) -> list[Tested]:
+    """Return the sizes of the tests of a plate: w for a given unit weight (option 14), else t."""
+    if result.problem.options.mean_error:
+        return [_sizes(each) for each in plate_standardized(result)]
+    squares, freedom = sum(result.solved.sums), result.degrees_of_freedom
+    return [_sizes(each).studentized(squares, freedom) for each in plate_standardized(result, unit=1.0)]
 
 
 def plate_findings(result: Result) -> Findings:
@@ -64,22 +80,26 @@ def plate_findings(result: Result) -> Findings:
     )
 
 
-def night_tests(result: CalibratedNight) -> list[Tested]:
-    """Return the tests of exposures: t, since the pixel standard deviation is assumed."""
-    found, freedom = result.calibration, result.calibration.degrees_of_freedom
+def night_standardized(result: CalibratedNight) -> list[Tested]:
+    """Return residuals of exposures over their standard deviations for the given pixel sd."""
+    found, catalogue, unit = result.calibration, result.night.catalogue, result.calibration.mean_error
 
     def image(index: tuple[int, ...]) -> Phrase:
         (x, y), exposure = found.xy[index[0]].tolist(), result.names[found.exposures[index[0]]]
         return phrase("stars.pixel-coordinate", axis="xy"[index[1]], x=x, y=y, exposure=exposure)
 
-    def star(index: tuple[int, ...]) -> Phrase:
-        name = result.night.catalogue.ids[found.catalogue[index[0]]]
-        return phrase("stars.place", axis=_AXES[index[1]], star=name)
+    images = Tested(
+        phrase("stars.image-coordinates"), _testable(unit * found.standardized, found.redundancy), image
+    )
+    names = [catalogue.ids[star] for star in found.catalogue.tolist()]
+    return [images, _stars(unit * found.star_standardized, found.star_redundancy, names)]
 
-    images = _testable(found.standardized, found.redundancy, found.mean_error)
-    stars = _testable(found.star_standardized, found.star_redundancy, found.mean_error)
-    tests = [Tested(phrase("stars.image-coordinates"), images, image), Tested(_PLACES, stars, star)]
-    return [each.studentized(found.mean_error**2 * freedom, freedom) for each in tests]
+
+def night_tests(result: CalibratedNight) -> list[Tested]:
+    """Return the tests of exposures: t, since the pixel standard deviation is assumed."""
+    found = result.calibration
+    squares, freedom = found.mean_error**2 * found.degrees_of_freedom, found.degrees_of_freedom
+    return [each.studentized(squares, freedom) for each in night_standardized(result)]
 
 
 def night_findings(result: CalibratedNight) -> Findings:

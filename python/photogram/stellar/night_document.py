@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,9 +11,8 @@ import numpy as np
 from photogram.arguments.types import Indices
 from photogram.io.angles import ARCSEC
 from photogram.show.judgement import remarks_section, verdict_document, verdict_table
-from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Section, about, conventions
+from photogram.show.page import Document, Fact, Facts, Layers, Section, about, conventions
 from photogram.show.quantity import Axis, Quantities, Quantity, Table, chosen, members, of_each
-from photogram.show.sketch.plot import Plot
 from photogram.stellar.camera_tables import (
     ARC_SECONDS,
     ARCSEC_OF_RAD,
@@ -29,8 +27,8 @@ from photogram.stellar.camera_tables import (
 from photogram.stellar.findings import night_tests
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE, LensTest
 from photogram.stellar.matching import ACCEPTED, LOG_ODDS
+from photogram.stellar.pictures import night_drawings
 from photogram.stellar.places import axis_of
-from photogram.stellar.plots import night_sketches
 
 if TYPE_CHECKING:
     from photogram.stellar import CalibratedNight, Night
@@ -50,7 +48,7 @@ def night_document(result: CalibratedNight) -> Document:
     lens = "Which lens the data prefer, and which of its terms are significant."
     layers = Layers("exposure-layers", exposures(result, MAX_EXPOSURES))
     sections = [
-        Section("pictures", "Stars and residuals", [pictures(night_sketches(result))]),
+        Section("pictures", "Stars and residuals", [night_drawings(result)]),
         Section("size", "Size and fit", [Facts("Size", much), Facts("Fit", good)]),
         Section("camera", "Camera", [parameters(result), correlation]),
         Section("exposures", "Exposures", [layers]),
@@ -74,15 +72,6 @@ def night_document(result: CalibratedNight) -> Document:
         members=_members(result),
         details=[*map(Section.of, details)],
     )
-
-
-def pictures(drawn: dict[str, Plot]) -> Layers:
-    """Return named plots as layers of a page."""
-    layers = [
-        Drawing(f"picture-{name}", name[:1].upper() + name[1:], "", partial(drawn.get, name))
-        for name in drawn
-    ]
-    return Layers("picture-layers", layers)
 
 
 def _members(result: CalibratedNight) -> dict[str, Any]:

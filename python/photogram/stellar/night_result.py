@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from photogram.statistics.findings import Findings
     from photogram.stellar.comparison import Standstill
     from photogram.stellar.lens_choice import LensFit, LensTest
+    from photogram.stellar.pictures import PicturedStars
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -239,6 +240,11 @@ class CalibratedNight(Judged, Documented):
         from photogram.stellar.night_document import night_document
 
         return night_document(self)
+
+    def _plot_data(self) -> PicturedStars:
+        from photogram.stellar.pictures import night_pictured
+
+        return night_pictured(self)
 
     def _findings(self) -> Findings:
         from photogram.stellar.findings import night_findings

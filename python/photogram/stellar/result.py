@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
     from photogram.stellar.movement import Movement
+    from photogram.stellar.pictures import PicturedStars
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -177,6 +178,11 @@ class Result(Judged, Documented):
         from photogram.stellar.document import plate_document
 
         return plate_document(self)
+
+    def _plot_data(self) -> PicturedStars:
+        from photogram.stellar.pictures import plate_pictured
+
+        return plate_pictured(self)
 
     def _findings(self) -> Findings:
         from photogram.stellar.findings import plate_findings

@@ -1,0 +1,158 @@
+"""Plot data of plates and nights: residuals, tests, correlations, distortion; plot of refraction."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from photogram.arguments.types import Bools
+from photogram.io.angles import ARCSEC
+from photogram.lazy_dataclasses import dataclass
+from photogram.plots.picture_data import Correlated, Curve, Curves, Images
+from photogram.results.distortion import lens_curve
+from photogram.results.network_document import drawings
+from photogram.results.parts import AdjustedCamera
+from photogram.results.picture_data import curves_of
+from photogram.show.page import Drawing, Layers
+from photogram.show.sketch.marks import Line, Mark, Panel, band, horizontal_line, spread
+from photogram.show.sketch.plot import Plot
+from photogram.show.style import COLOURS, FAINT
+from photogram.statistics.findings import Tested
+from photogram.stellar.camera_tables import correlations
+from photogram.stellar.curves import distortion_curves, refraction_curves
+from photogram.stellar.findings import night_standardized, plate_standardized
+from photogram.stellar.parameters import GROUPS
+from photogram.stellar.sky_cameras import SkyCamera
+
+if TYPE_CHECKING:
+    from photogram.stellar import CalibratedNight, Result
+
+PICTURES = ("residuals", "tests", "correlations", "distortion")
+_RADII = 200
+
+
+@dataclass(frozen=True, eq=False)
+class PicturedStars:
+    """Plot data of star images: the parts of `plots.picture_data.Pictured` without a network."""
+
+    images: Images
+    tested: Sequence[Tested]
+    outlying: list[Bools]
+    correlations: list[Correlated]
+    distortion: list[Curves]
+    unit_weight: float = 1.0
+
+
+def plate_pictured(result: Result) -> PicturedStars:
+    """Return the plot data of a plate; attitude groups have separate panels."""
+    problem, tested = result.problem, plate_standardized(result)
+    rows = np.flatnonzero(result.solved.free)
+    matrix = correlations(result.covariance)[np.ix_(rows, rows)]
+    images = Images(
+        unit="mm",
+        photos=problem.image_groups,
+        points=problem.image_stars,
+        xy=1e3 * problem.image_xy,
+        residuals=-1e3 * result.solved.residuals,
+        redundancy=result.solved.redundancy,
+        cameras=problem.image_groups,
+        names=GROUPS,
+        down=False,
+        scanned=np.zeros(len(problem.image_xy), bool),
+    )
+    marks = [result.verdict.marks(each.kind, each.values.shape) for each in tested]
+    correlated = [Correlated("plate", result.estimated, matrix)]
+    return PicturedStars(images, tested, marks, correlated, _plate_distortion(result))
+
+
+def _plate_distortion(result: Result) -> list[Curves]:
+    problem, values = result.problem, result.parameters
+    if not problem.options.curves:
+        return []
+    fine = replace(problem.options, interval=(problem.options.extent or 0.1) / _RADII)
+    found = distortion_curves(replace(result, problem=replace(problem, options=fine)))
+    centre = values["xp"] + values["dx"], values["yp"] + values["dy"]
+    distance = f"transformed for the calibrated principal distance {1e3 * found.calibrated:.4f} mm"
+    curves = [
+        Curve("", 1e3 * found.radial, {"radial distortion": 1e3 * found.radial_error}),
+        Curve(distance, 1e3 * found.transformed, {"transformed curve": 1e3 * found.transformed_error}),
+        Curve("decentring profile", 1e3 * found.decentering, {"profile": 1e3 * found.decentering_error}),
+    ]
+    observed = float(np.linalg.norm(problem.image_xy - centre, axis=1).max())
+    observed = 1e3 * min(observed, problem.options.extent)
+    return [Curves("the plate", "mm", 1e3 * found.distance, observed, curves)]
+
+
+def night_pictured(result: CalibratedNight) -> PicturedStars:
+    """Return the plot data of a night, with all exposures in one panel."""
+    found, tested = result.calibration, night_standardized(result)
+    images = Images(
+        unit="px",
+        photos=found.exposures,
+        points=found.stars,
+        xy=found.xy,
+        residuals=found.residuals,
+        redundancy=found.redundancy,
+        cameras=np.zeros_like(found.exposures),
+        names=[result.camera.lens],
+        down=True,
+        scanned=np.zeros(len(found.xy), bool),
+    )
+    camera = adjusted_camera(result.camera, len(found.xy))
+    known = np.flatnonzero(np.diag(camera.covariance) > 0)
+    names = [camera.names[row] for row in known]
+    correlated = [Correlated(camera.name, names, camera.correlations[np.ix_(known, known)])]
+    curve = lens_curve(camera, found.xy)
+    marks = [result.verdict.marks(each.kind, each.values.shape) for each in tested]
+    distortion = [] if curve is None else [curves_of(camera, curve)]
+    return PicturedStars(images, tested, marks, correlated, distortion, found.mean_error)
+
+
+def adjusted_camera(camera: SkyCamera, images: int) -> AdjustedCamera:
+    """Return a calibrated camera as one of blocks, in the order of its model."""
+    block_camera = camera.as_camera(camera.lens)
+    none = np.zeros(len(block_camera.names))
+    covariance = np.zeros((len(none), len(none)))
+    covariance[np.ix_(camera.facts.places, camera.facts.places)] = camera.covariance
+    return AdjustedCamera(
+        camera.lens, block_camera, block_camera, covariance, covariance, none, none, 0, images
+    )
+
+
+def plate_drawings(result: Result) -> Layers:
+    """Return the drawings of a plate as layers."""
+    shown = [*drawings(result, PICTURES).values()]
+    if result.problem.options.refraction:
+        shown.append(Drawing("picture-refraction", "Refraction", "", partial(_refraction, result)))
+    return Layers("picture-layers", shown)
+
+
+def night_drawings(result: CalibratedNight) -> Layers:
+    """Return the drawings of a night as layers."""
+    return Layers("picture-layers", [*drawings(result, PICTURES).values()])
+
+
+def _refraction(result: Result) -> Plot:
+    marks: list[Mark] = []
+    ends = []
+    for group in np.flatnonzero(result.solved.free[:9:3]).tolist():
+        found = refraction_curves(result, group)
+        z, change = np.degrees(found.zenith_distance), (found.corrected - found.given) / ARCSEC
+        low, high = change - found.error / ARCSEC, change + found.error / ARCSEC
+        marks.append(band(z, low, high, COLOURS[group], 0.2))
+        marks.append(Line(np.column_stack([z, change]), COLOURS[group], label=f"field of {GROUPS[group]}"))
+        ends.append([z, low, high])
+    z, low, high = np.concatenate(ends, axis=1)
+    panel = Panel(
+        np.column_stack([spread(z), spread(low, high)]),
+        [*marks, horizontal_line(0.0, FAINT, 0.8)],
+        "Change of the refraction with its mean error",
+        "observed zenith distance, degrees",
+        "corrected minus given refraction, arcsec",
+        legend="below",
+    )
+    return Plot(7.5, 4.8, [panel])
