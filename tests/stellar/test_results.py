@@ -87,28 +87,29 @@ def test_the_document_has_the_determinant_of_every_solution(plate):
 def test_ellipses_of_unknown_directions(unknown):
     """Section 5.7, against its formulas instead of eigenvectors."""
     problem, solved = unknown.problem, unknown.solved
-    for direction in unknown.directions():
-        star = problem.star_ids.index(direction.star)
+    directions = unknown.directions()
+    for k, star in enumerate(directions.stars):
         images = problem.image_stars == star
         inverse = solved.star_inverse[star]
         q = solved.star_cofactors[star] - inverse
         own = unknown.mean_error
         if images.sum() > 1:
             own = math.sqrt((solved.residuals[images] ** 2).sum() / (2 * images.sum() - 2))
-        assert direction.image_mean_error == pytest.approx(own, rel=1e-12)
-        turn = np.diag([math.cos(direction.place[1]), 1.0])
+        assert directions.image_mean_errors[k] == pytest.approx(own, rel=1e-12)
+        turn = np.diag([math.cos(directions.places[k, 1]), 1.0])
         for found, covariance in (
-            (direction.orientation, unknown.mean_error**2 * q),
-            (direction.published, unknown.mean_error**2 * q + own**2 * inverse),
-            (direction.total, unknown.mean_error**2 * (q + inverse)),
+            (directions.orientation, unknown.mean_error**2 * q),
+            (directions.published, unknown.mean_error**2 * q + own**2 * inverse),
+            (directions.total, unknown.mean_error**2 * (q + inverse)),
         ):
             (q11, q12), (_, q22) = turn @ covariance @ turn
             theta = 0.5 * math.atan2(2 * q12, q11 - q22)
             spread = 2 * q12 / math.sin(2 * theta)
-            assert found.major == pytest.approx(math.sqrt((q11 + q22 + spread) / 2), rel=1e-6)
-            assert found.minor == pytest.approx(math.sqrt((q11 + q22 - spread) / 2), rel=1e-4)
-            assert math.remainder(found.direction - theta, math.pi) == pytest.approx(0, abs=1e-6)
-        assert direction.orientation.major < direction.total.major
+            major, minor, direction = found[k]
+            assert major == pytest.approx(math.sqrt((q11 + q22 + spread) / 2), rel=1e-6)
+            assert minor == pytest.approx(math.sqrt((q11 + q22 - spread) / 2), rel=1e-4)
+            assert math.remainder(direction - theta, math.pi) == pytest.approx(0, abs=1e-6)
+        assert directions.orientation[k, 0] < directions.total[k, 0]
 
 
 def test_unknown_directions_in_the_document(unknown):
@@ -157,13 +158,15 @@ def test_the_combined_solution_has_all_tables(still):
 
 def test_fictitious_points_agree_with_the_movement_test(still):
     result = calibrate(still)
-    points = {(p.group, p.xy): p for p in fictitious_points(result)}
-    assert len(points) == 27
+    points = fictitious_points(result)
+    rows = {key: row for row, key in enumerate(zip(points.groups, points.xy.tolist(), strict=True))}
+    assert len(rows) == 27
     for m in result.movement:
-        a, b = points[m.first, m.xy], points[m.second, m.xy]
-        assert b.elevation - a.elevation == pytest.approx(m.differences[3], abs=1e-12)
+        a, b = rows[m.first, m.xy], rows[m.second, m.xy]
+        elevations = points.horizontal[:, 1]
+        assert elevations[b] - elevations[a] == pytest.approx(m.differences[3], abs=1e-12)
         # Each direction's own error is at least a part of their difference's.
-        assert np.linalg.eigvalsh(a.covariance)[0] > 0
+        assert np.linalg.eigvalsh(points.covariances[a])[0] > 0
 
 
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, -45.0])

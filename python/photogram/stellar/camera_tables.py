@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,11 +15,16 @@ from photogram.show.quantity import Axis, Kind, Quantity, Table, component
 from photogram.stellar.parameters import GRAD
 from photogram.words import Phrase, phrase
 
+if TYPE_CHECKING:
+    from photogram.statistics.findings import Tested
+    from photogram.statistics.verdict import Verdict
+
+MAX_WORST_COORDINATES = 25
 CORRELATED = 0.95  # Correlations above this cause a warning
 
 Unit = tuple[str, str, float]  # Base unit of values, printed unit, and their factor
 MM, UM_OF_M, UM = ("m", "mm", 1e3), ("m", "um", 1e6), ("um", "um", 1.0)
-SECONDS, ARC_SECONDS = ("s", "s", 1.0), ("arcsec", "arcsec", 1.0)
+SECONDS, ARC_SECONDS, PIXELS = ("s", "s", 1.0), ("arcsec", "arcsec", 1.0), ("px", "px", 1.0)
 ARCSEC_OF_RAD = ("rad", "arcsec", 1 / ARCSEC)
 DEGREES, GRADS = ("rad", "deg", math.degrees(1)), ("rad", "grads", 1 / GRAD)
 
@@ -132,3 +137,18 @@ def matrix_table(key: str, title: str, names: Sequence[str], matrix: Floats, **f
         title,
         [names_column(names, "Parameter"), Quantity(matrix, tuple(map(Axis, names)), head="{}", **form)],
     )
+
+
+def worst_table(verdict: Verdict, tests: Tested, residuals: Floats, unit: Unit) -> Table:
+    """Return the image coordinates with the largest test values, with outliers marked."""
+    order = np.argsort(-np.nan_to_num(np.abs(tests.values)), axis=None, kind="stable")
+    places = np.unravel_index(order[:MAX_WORST_COORDINATES], tests.values.shape)
+    names = (tests.name(place) for place in zip(*(each.tolist() for each in places), strict=True))
+    marked = verdict.marks(tests.kind, tests.values.shape)[places]
+    columns = [
+        names_column(map(str, names), "Image coordinate"),
+        column(residuals[places], unit, "Residual", 3),
+        column(tests.values[places], None, f"Test value {tests.statistic}", 2, marked=marked),
+    ]
+    note = f"The {len(marked)} image coordinates of the largest test values."
+    return Table("worst", "Worst observations", columns, note)

@@ -2,86 +2,74 @@
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
 
 
-@dataclass(frozen=True)
-class Ellipse:
-    """Mean error ellipse on the sphere, radians."""
+def mean_error_ellipses(covariances: Floats, declinations: Floats) -> Floats:
+    """Return (n, 3) major and minor semi-axes and directions of ellipses on the sphere, radians.
 
-    major: float
-    minor: float
-    direction: float  # of the major axis, from increasing right ascension towards increasing declination
-
-
-def ellipse(covariance: Floats, declination: float) -> Ellipse:
-    """Return the mean error ellipse from a covariance of right ascension, declination."""
-    turned = np.diag([math.cos(declination), 1.0])
-    values, vectors = np.linalg.eigh(turned @ covariance @ turned)
-    minor, major = (math.sqrt(max(float(value), 0.0)) for value in values)
-    return Ellipse(major, minor, math.atan2(vectors[1, 1], vectors[0, 1]) % math.pi)
+    Covariances (n, 2, 2) are of right ascension and declination. Directions of the major axes count from
+    increasing right ascension towards increasing declination.
+    """
+    scale = np.column_stack([np.cos(declinations), np.ones(len(declinations))])
+    values, vectors = np.linalg.eigh(covariances * scale[:, :, None] * scale[:, None])
+    minor, major = np.sqrt(np.maximum(values, 0.0)).T
+    return np.column_stack([major, minor, np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]) % np.pi])
 
 
 @dataclass(frozen=True, eq=False)
-class Direction:
-    """Estimated unknown direction; all angles are in radians."""
+class Directions:
+    """Estimated directions of k unknown stars, in radians."""
 
-    star: str
-    place: tuple[float, float]  # Right ascension and declination
-    correction: tuple[float, float]  # Correction of the direction of its first image
-    azimuth: float  # Observed (refracted) at its first image, from south, positive west
-    elevation: float
-    mean_errors: tuple[float, float]  # Mean errors of right ascension times cos(declination), and declination
-    # m_i: mean error of unit weight from the agreement of its own images; for a single image, the one of the
-    # adjustment
-    image_mean_error: float
-    orientation: Ellipse  # From the orientation only, with error-free images
-    total: Ellipse  # With its images at the mean error of unit weight of the adjustment
-    published: Ellipse  # With its images at m_i, as in the report
+    stars: Indices  # (k,) rows among the stars
+    places: Floats  # (k, 2) right ascension and declination
+    corrections: Floats  # (k, 2) of the direction of the first image
+    # (k, 2) observed (refracted) azimuth from south, positive west, and elevation at the first image
+    horizontal: Floats
+    mean_errors: Floats  # (k, 2) of right ascension times cos(declination), and of declination
+    # (k,) m_i: mean error of unit weight from the agreement of the images of a star; for a single image, the
+    # one of the adjustment
+    image_mean_errors: Floats
+    # (k, 3) ellipses: from the orientation only; with images at the mean error of unit weight of the
+    # adjustment; with images at m_i, as in the report
+    orientation: Floats
+    total: Floats
+    published: Floats
 
 
-def directions(result: Result) -> list[Direction]:
+def directions(result: Result) -> Directions:
     """Return the unknown directions of a plate with their error ellipses."""
     problem, solved, unit = result.problem, result.solved, result.mean_error
-    unknown = np.flatnonzero(~problem.known)
-    if not unknown.size:
-        return []
-    of_images = problem.core(solved.parameters, solved.places, ~solved.free).directions()
-    order = np.argsort(problem.image_stars, kind="stable")
-    firsts = np.searchsorted(problem.image_stars[order], unknown)
-    counts = np.bincount(problem.image_stars)[unknown]
-    found = []
-    for star, begin, count in zip(unknown.tolist(), firsts, counts, strict=True):
-        images = order[begin : begin + count]
-        (right, declination), first = solved.places[star].tolist(), of_images[images[0]]
-        residuals, weights = solved.residuals[images], problem.image_weights[images]
-        square = float(np.einsum("mi,mij,mj->", residuals, weights, residuals))
-        image_error = math.sqrt(square / (2 * len(images) - 2)) if len(images) > 1 else unit
-        inverse, total = solved.star_inverse[star], result.star_covariances[star]
-        orientation = unit**2 * (solved.star_cofactors[star] - inverse)
-        time = problem.image_times[images[:1]]
-        ((xi, eta),) = problem.site.standard_coordinates(solved.places[[star]], time, solved.parameters[22:])
-        found.append(
-            Direction(
-                star=problem.star_ids[star],
-                place=(right, declination),
-                correction=(math.remainder(right - first[0], math.tau), float(declination - first[1])),
-                azimuth=math.atan2(-eta, -xi) % math.tau,
-                elevation=math.atan2(1.0, math.hypot(xi, eta)),
-                mean_errors=(math.sqrt(total[0, 0]) * math.cos(declination), math.sqrt(total[1, 1])),
-                image_mean_error=image_error,
-                orientation=ellipse(orientation, declination),
-                total=ellipse(total, declination),
-                published=ellipse(orientation + image_error**2 * inverse, declination),
-            )
-        )
-    return found
+    stars = np.flatnonzero(~problem.known)
+    seen, first = np.unique(problem.image_stars, return_index=True)
+    first = first[np.searchsorted(seen, stars)]
+    squares = np.einsum("mi,mij,mj->m", solved.residuals, problem.image_weights, solved.residuals)
+    sums, counts = (np.bincount(problem.image_stars, each)[stars] for each in (squares, None))
+    image_errors = np.where(counts > 1, np.sqrt(sums / np.maximum(2 * counts - 2, 1)), unit)
+    places, inverse, total = solved.places[stars], solved.star_inverse[stars], result.star_covariances[stars]
+    orientation = unit**2 * (solved.star_cofactors[stars] - inverse)
+    published = orientation + image_errors[:, None, None] ** 2 * inverse
+    core = problem.core(solved.parameters, solved.places, ~solved.free)
+    corrections = places - (core.directions()[first] if stars.size else places)
+    corrections[:, 0] = np.remainder(corrections[:, 0] + np.pi, 2 * np.pi) - np.pi
+    xi, eta = problem.site.standard_coordinates(places, problem.image_times[first], solved.parameters[22:]).T
+    cosines = np.column_stack([np.cos(places[:, 1]), np.ones(len(stars))])
+    return Directions(
+        stars=stars,
+        places=places,
+        corrections=corrections,
+        horizontal=np.column_stack([np.arctan2(-eta, -xi) % (2 * np.pi), np.arctan2(1.0, np.hypot(xi, eta))]),
+        mean_errors=np.sqrt(np.diagonal(total, axis1=1, axis2=2)) * cosines,
+        image_mean_errors=image_errors,
+        orientation=mean_error_ellipses(orientation, places[:, 1]),
+        total=mean_error_ellipses(total, places[:, 1]),
+        published=mean_error_ellipses(published, places[:, 1]),
+    )

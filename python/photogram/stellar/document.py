@@ -23,7 +23,7 @@ from photogram.show.page import (
 )
 from photogram.show.quantity import Table, members
 from photogram.stellar import tables
-from photogram.stellar.camera_tables import correlated_members, matrix_table
+from photogram.stellar.camera_tables import UM_OF_M, correlated_members, matrix_table, worst_table
 from photogram.stellar.curves import (
     comparator_frame,
     distortion_curves,
@@ -31,6 +31,7 @@ from photogram.stellar.curves import (
     refraction_curves,
     residual_classes,
 )
+from photogram.stellar.findings import plate_tests
 from photogram.stellar.lens_choice import LEVEL, equal
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX
 from photogram.stellar.pictures import plate_drawings
@@ -39,8 +40,6 @@ from photogram.stellar.sky import Site
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
-
-MAX_WORST_COORDINATES = 25
 
 
 def plate_document(result: Result) -> Document:
@@ -53,7 +52,7 @@ def plate_document(result: Result) -> Document:
         Section("size", "Size and fit", size),
         of_solution.pop("parameters"),
         of_solution.pop("derived"),
-        Section.of(tables.worst(result, MAX_WORST_COORDINATES)),
+        Section.of(worst_table(result.verdict, plate_tests(result)[0], result.solved.residuals, UM_OF_M)),
         Section.of(verdict_table(result.verdict)),
         of_solution.pop("directions"),
         of_solution.pop("distortion"),
@@ -73,7 +72,7 @@ def plate_document(result: Result) -> Document:
         Section("residuals", "Residuals", [Facts("Residuals", _residuals(result))]),
         *of_solution.values(),
         Section.of(tables.pre_run(result)),
-        Section.of(tables.fictitious(result)),
+        *map(Section.of, tables.fictitious(result)),
         Section("histogram", "Histogram of residuals", [Layers("histogram-layers", histograms)]),
         *_combined(result),
     ]

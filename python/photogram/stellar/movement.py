@@ -34,15 +34,14 @@ class Movement:
 
 
 @dataclass(frozen=True, eq=False)
-class FictitiousPoint:
-    """Direction of a plate point under one attitude."""
+class FictitiousPoints:
+    """Directions of n plate points under estimated attitudes, radians."""
 
-    group: str  # Group of the attitude
-    xy: float  # x = y of the point, metres
-    place: tuple[float, float]  # Apparent right ascension and declination, radians
-    azimuth: float  # Observed (refracted), from south, positive west; radians
-    elevation: float
-    covariance: Floats  # (2, 2) direction covariance from the orientation, radians squared
+    groups: tuple[str, ...]  # Groups of the attitudes
+    xy: Floats  # (n,) x = y of the points, metres
+    places: Floats  # (n, 2) apparent right ascension and declination
+    horizontal: Floats  # (n, 2) observed (refracted) azimuth from south, positive west, and elevation
+    covariances: Floats  # (n, 2, 2) of the positions, from the orientation
 
 
 _DIAGONAL = np.arange(9) * 0.01  # x = y of the fictitious points, metres
@@ -70,18 +69,15 @@ def movement(result: Result) -> tuple[Movement, ...]:
     return tuple(tests)
 
 
-def fictitious_points(result: Result) -> tuple[FictitiousPoint, ...]:
+def fictitious_points(result: Result) -> FictitiousPoints:
     """Compute the directions of the nine points for every attitude, with covariances."""
-    points = []
-    for group in _solved(result):
-        places, local, by = _directions(result, group)
-        covariances = by @ result.covariance @ np.swapaxes(by, 1, 2)
-        rows = zip(_DIAGONAL.tolist(), places.tolist(), local.tolist(), covariances, strict=True)
-        points += [
-            FictitiousPoint(GROUPS[group], xy, (ra, dec), azimuth % (2 * np.pi), elevation, covariance)
-            for xy, (ra, dec), (azimuth, elevation), covariance in rows
-        ]
-    return tuple(points)
+    groups = _solved(result)
+    found = [_directions(result, group) for group in groups]
+    places, local, by = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    local[:, 0] %= 2 * np.pi
+    names = np.repeat([GROUPS[group] for group in groups], len(_DIAGONAL)).tolist()
+    covariances = by @ result.covariance @ np.swapaxes(by, 1, 2)
+    return FictitiousPoints(tuple(names), np.tile(_DIAGONAL, len(groups)), places, local, covariances)
 
 
 def _solved(result: Result) -> list[int]:

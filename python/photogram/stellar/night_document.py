@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.types import Indices
 from photogram.io.angles import ARCSEC
 from photogram.show.judgement import remarks_section, verdict_document, verdict_table
 from photogram.show.page import Document, Fact, Facts, Layers, Section, about, conventions
@@ -17,12 +16,14 @@ from photogram.stellar.camera_tables import (
     ARC_SECONDS,
     ARCSEC_OF_RAD,
     GRADS,
+    PIXELS,
     column,
     correlated_members,
     correlations,
     matrix_table,
     names_column,
     parameter_table,
+    worst_table,
 )
 from photogram.stellar.findings import night_tests
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE, LensTest
@@ -33,7 +34,6 @@ from photogram.stellar.places import axis_of
 if TYPE_CHECKING:
     from photogram.stellar import CalibratedNight, Night
 
-MAX_WORST_IMAGES = 25
 MAX_EXPOSURES = 200
 
 
@@ -53,7 +53,7 @@ def night_document(result: CalibratedNight) -> Document:
         Section("camera", "Camera", [parameters(result), correlation]),
         Section("exposures", "Exposures", [layers]),
         Section("lens", "Lens", [lens_tests(result), lenses(result)], lens),
-        Section.of(worst(result, MAX_WORST_IMAGES)),
+        Section.of(worst_table(result.verdict, night_tests(result)[0], result.calibration.residuals, PIXELS)),
         Section.of(verdict_table(result.verdict)),
         remarks_section(result.messages),
     ]
@@ -284,20 +284,6 @@ def images(result: CalibratedNight) -> Table:
     ]
     about = "Pixels right and down, measured minus computed; probability of the star of each image."
     return Table("images", "Images and their stars", columns, about=about)
-
-
-def worst(result: CalibratedNight, most: int) -> Table:
-    """Return the images with the largest standardized residuals, with outliers marked."""
-    size = np.nan_to_num(np.abs(result.calibration.standardized)).max(axis=1, initial=0.0)
-    rows: Indices = np.argsort(-size, kind="stable")[:most]
-    tests = night_tests(result)[0]
-    marked = result.verdict.marks(tests.kind, tests.values.shape)
-    columns = [
-        replace(column, marked=marked) if column.member == "standardized" else column
-        for column in images(result).columns[:-1]
-    ]
-    note = f"The {len(rows)} images of the largest test values."
-    return _for_people("worst", "Worst observations", chosen(columns, rows), note)
 
 
 def _for_people(key: str, title: str, columns: Quantities, note: str = "") -> Table:

@@ -17,7 +17,7 @@ from photogram.show.methods import Documented, Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.camera_tables import correlated, correlation_remarks, correlations, significance
 from photogram.stellar.cameras import PlateCamera
-from photogram.stellar.directions import Direction, Ellipse, directions, ellipse
+from photogram.stellar.directions import Directions, directions, mean_error_ellipses
 from photogram.stellar.parameters import DISTORTION, INDEX, NAMES, SIGNIFICANT
 from photogram.stellar.problem import Counts, Problem
 from photogram.stellar.state import Level, PreRun, Solved, Stage
@@ -164,12 +164,11 @@ class Result(Judged, Documented):
         """(S, 2) residuals of the catalogue positions over their mean errors."""
         return self.solved.star_standardized / (self.mean_error or math.nan)
 
-    def ellipses(self) -> list[Ellipse]:
-        """Return the mean error ellipse of every star."""
-        pairs = zip(self.star_covariances, self.solved.places, strict=True)
-        return [ellipse(covariance, place[1]) for covariance, place in pairs]
+    def ellipses(self) -> Floats:
+        """Return (S, 3) semi-axes and directions of the mean error ellipses of the stars, radians."""
+        return mean_error_ellipses(self.star_covariances, self.solved.places[:, 1])
 
-    def directions(self) -> list[Direction]:
+    def directions(self) -> Directions:
         """Return the unknown directions with their error ellipses."""
         return directions(self)
 

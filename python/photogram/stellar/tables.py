@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.io.angles import ARCSEC, degrees_minutes_seconds
 from photogram.lazy_dataclasses import fields
 from photogram.show.page import about
@@ -34,8 +33,7 @@ from photogram.stellar.curves import (
     residual_classes,
     star_means,
 )
-from photogram.stellar.directions import Ellipse, ellipse
-from photogram.stellar.findings import plate_tests
+from photogram.stellar.directions import mean_error_ellipses
 from photogram.stellar.movement import fictitious_points
 from photogram.stellar.parameters import GRAD, GROUPS, NAMES, UNITS
 from photogram.stellar.places import transformed_angles
@@ -158,7 +156,7 @@ def stars(result: Result) -> Table:
         names_column(problem.star_names or problem.star_ids, "Name", "name"),
         Quantity(known, name="known", member="known"),
         Quantity(result.solved.places, member="place_rad"),
-        Quantity([*map(_ellipse, result.ellipses())], member="ellipse"),
+        Quantity(_ellipse_members(result.ellipses()), member="ellipse"),
         column(residuals[:, 0] / 15, SECONDS, "Residual ra", 6),
         column(residuals, ARC_SECONDS, "Residual {}", 4, "residual", place),
         column(redundancy, None, "r {}", 2, "redundancy", place),
@@ -173,35 +171,34 @@ def stars(result: Result) -> Table:
 
 def _unknown(result: Result) -> list[Quantity]:
     """Return members of the stars with unknown directions, absent for known stars."""
-    rows = {
-        direction.star: {
-            "correction": [value / ARCSEC for value in direction.correction],
-            "azimuth_rad": direction.azimuth,
-            "elevation_rad": direction.elevation,
-            "m_i": direction.image_mean_error,
-            "orientation_ellipse": _ellipse(direction.orientation),
-            "published_ellipse": _ellipse(direction.published),
-        }
-        for direction in result.directions()
+    found = result.directions()
+    azimuth, elevation = found.horizontal.T.tolist()
+    members: dict[str, Sequence[object]] = {
+        "correction": (found.corrections / ARCSEC).tolist(),
+        "azimuth_rad": azimuth,
+        "elevation_rad": elevation,
+        "m_i": found.image_mean_errors.tolist(),
+        "orientation_ellipse": _ellipse_members(found.orientation),
+        "published_ellipse": _ellipse_members(found.published),
     }
-    names = next(iter(rows.values()))
-    of_stars = [rows.get(star, {}) for star in result.problem.star_ids]
-    columns = {name: np.fromiter((row.get(name) for row in of_stars), object) for name in names}
-    return [Quantity(values, member=name) for name, values in columns.items()]
+    columns = []
+    for name, values in members.items():
+        of_stars = dict(zip(found.stars.tolist(), values, strict=True))
+        cells = np.fromiter(map(of_stars.get, range(len(result.problem.star_ids))), object)
+        columns.append(Quantity(cells, member=name))
+    return columns
 
 
-def _ellipse(e: Ellipse) -> dict[str, float]:
-    return {
-        "major_arcsec": e.major / ARCSEC,
-        "minor_arcsec": e.minor / ARCSEC,
-        "direction_rad": e.direction,
-    }
+def _ellipse_members(ellipses: Floats) -> list[dict[str, float]]:
+    names = ("major_arcsec", "minor_arcsec", "direction_rad")
+    rows = (ellipses / [ARCSEC, ARCSEC, 1.0]).tolist()
+    return [dict(zip(names, row, strict=True)) for row in rows]
 
 
-def _ellipses(ellipses: Sequence[Ellipse], of: str) -> list[Quantity]:
+def _ellipses(ellipses: Floats, of: str) -> list[Quantity]:
     return [
-        column([(e.major, e.minor) for e in ellipses], ARCSEC_OF_RAD, f"{{}}, {of}", 4, parts="a, b"),
-        column([e.direction for e in ellipses], DEGREES, "Direction", 2),
+        column(ellipses[:, :2], ARCSEC_OF_RAD, f"{{}}, {of}", 4, parts="a, b"),
+        column(ellipses[:, 2], DEGREES, "Direction", 2),
     ]
 
 
@@ -209,15 +206,15 @@ def directions(result: Result) -> Table:
     """Return unknown directions with orientation and total ellipses."""
     found = result.directions()
     columns = [
-        names_column((d.star for d in found), "Star"),
-        *_places([d.place for d in found]),
-        column([d.azimuth for d in found], DEGREES, "Azimuth S", 5),
-        column([d.elevation for d in found], DEGREES, "Elevation", 5),
-        column([d.mean_errors for d in found], ARCSEC_OF_RAD, "Mean error {}", 4, parts="ra, dec"),
-        column([d.image_mean_error for d in found], UM_OF_M, "m_i", 3),
-        *_ellipses([d.orientation for d in found], "orientation"),
-        *_ellipses([d.total for d in found], "total"),
-        *_ellipses([d.published for d in found], "with m_i"),
+        names_column((result.problem.star_ids[star] for star in found.stars), "Star"),
+        *_places(found.places),
+        column(found.horizontal[:, 0], DEGREES, "Azimuth S", 5),
+        column(found.horizontal[:, 1], DEGREES, "Elevation", 5),
+        column(found.mean_errors, ARCSEC_OF_RAD, "Mean error {}", 4, parts="ra, dec"),
+        column(found.image_mean_errors, UM_OF_M, "m_i", 3),
+        *_ellipses(found.orientation, "orientation"),
+        *_ellipses(found.total, "total"),
+        *_ellipses(found.published, "with m_i"),
     ]
     about = (
         "Stars with estimated places, mean errors, and semi-axes and directions of their ellipses: from the"
@@ -227,36 +224,42 @@ def directions(result: Result) -> Table:
     return Table("directions", "Unknown directions", columns, about=about)
 
 
-def _places(places: Sequence[tuple[float, float]]) -> list[Quantity]:
+def _places(places: Floats) -> list[Quantity]:
     return [
-        names_column((hours(ra % math.tau) for ra, _ in places), "Right ascension"),
-        names_column((degrees(dec) for _, dec in places), "Declination"),
+        names_column((hours(ra % math.tau) for ra, _ in places.tolist()), "Right ascension"),
+        names_column((degrees(dec) for _, dec in places.tolist()), "Declination"),
     ]
 
 
-def fictitious(result: Result) -> Table:
+def fictitious(result: Result) -> list[Table]:
     """Return directions of plate points for every attitude, with orientation ellipses."""
-    points = fictitious_points(result) if result.movement else ()
-    deviations = [np.sqrt(np.diag(p.covariance)) * [math.cos(p.place[1]), 1.0] for p in points]
+    if not result.movement:
+        return []
+    found = fictitious_points(result)
+    declinations = found.places[:, 1]
+    deviations = np.sqrt(np.diagonal(found.covariances, axis1=1, axis2=2))
+    deviations[:, 0] *= np.cos(declinations)
     columns = [
-        names_column((p.group for p in points), "Orientation", "group"),
-        column([p.xy for p in points], MM, "x = y", 0, "xy"),
-        of_each(points, "place"),
-        *_places([p.place for p in points]),
-        column([p.azimuth for p in points], DEGREES, "Azimuth S", 5, "azimuth"),
-        column([p.elevation for p in points], DEGREES, "Elevation", 5, "elevation"),
+        names_column(found.groups, "Orientation", "group"),
+        column(found.xy, MM, "x = y", 0, "xy"),
+        Quantity(found.places, member="place"),
+        *_places(found.places),
+        column(found.horizontal[:, 0], DEGREES, "Azimuth S", 5, "azimuth"),
+        column(found.horizontal[:, 1], DEGREES, "Elevation", 5, "elevation"),
         column(deviations, ARCSEC_OF_RAD, "Mean error {}", 4, parts="ra, dec"),
-        *_ellipses([ellipse(p.covariance, p.place[1]) for p in points], "orientation"),
-        of_each(points, "covariance"),
+        *_ellipses(mean_error_ellipses(found.covariances, declinations), "orientation"),
+        Quantity(found.covariances, member="covariance"),
     ]
-    return Table("fictitious_points", "Fictitious points on the diagonal", columns, about=_AZIMUTHS)
+    return [Table("fictitious_points", "Fictitious points on the diagonal", columns, about=_AZIMUTHS)]
 
 
 def images(result: Result) -> Table:
     """Return plate coordinates with residuals v, redundancy r and tests w."""
     problem, solved = result.problem, result.solved
     columns = [
-        *_images_of(result),
+        names_column(problem.image_points, "Point", "point"),
+        names_column((problem.star_ids[star] for star in problem.image_stars), "Star", "star"),
+        names_column((GROUPS[group] for group in problem.image_groups), "Orientation", "orientation"),
         column(problem.image_xy, MM, "{}", 5, "xy_m", "x, y"),
         names_column(map(hours, problem.image_times.tolist()), "Time"),
         column(_before(result, problem.image_weights), UM_OF_M, "Before {}", 3, parts="x, y"),
@@ -266,36 +269,6 @@ def images(result: Result) -> Table:
     ]
     about = "Computed minus measured; redundancy numbers r, standardized residuals w, mean errors before."
     return Table("images", "Plate data", columns, about=about)
-
-
-def _images_of(result: Result) -> list[Quantity]:
-    problem = result.problem
-    return [
-        names_column(problem.image_points, "Point", "point"),
-        names_column((problem.star_ids[star] for star in problem.image_stars), "Star", "star"),
-        names_column((GROUPS[group] for group in problem.image_groups), "Orientation", "orientation"),
-    ]
-
-
-def worst(result: Result, most: int) -> Table:
-    """Return the plate coordinates with the largest test values."""
-    tests = plate_tests(result)[0]
-    values = np.abs(tests.values)
-    sizes = np.nan_to_num(values)
-    order: Indices = np.argsort(-sizes, axis=None, kind="stable")[:most]
-    point, star, _ = (replace(column, member="") for column in _images_of(result))
-    columns = [
-        point,
-        star,
-        column(result.solved.residuals, UM_OF_M, "Residual", 2, parts="x, y"),
-        replace(
-            column(values, None, f"Test value {tests.statistic}", 2, parts="x, y"),
-            marked=result.verdict.marks(tests.kind, tests.values.shape),
-        ),
-    ]
-    note = f"The {len(order)} plate coordinates of the largest test values."
-    places = np.column_stack(np.unravel_index(order, sizes.shape))
-    return Table("worst", "Worst observations", columns, note, shown=places)
 
 
 def _before(result: Result, weights: Floats) -> Floats:
