@@ -16,10 +16,10 @@ import numpy as np
 from photogram.stellar import (
     ARCSEC,
     Air,
-    BrownCamera,
     Catalogue,
     Earth,
     Site,
+    SkyCamera,
     apparent_places,
     attitude_of,
     project_sky,
@@ -31,7 +31,7 @@ FOLDER = Path(__file__).resolve().parents[1] / "python/photogram/examples/exposu
 SITE = Site(np.radians(47.05), np.radians(-8.31), 480.0, Air(278.15, 718.0), aberration=0.3192 * ARCSEC)
 EARTH = Earth(-0.0076, (0.0237 * ARCSEC, 0.3304 * ARCSEC))
 FRAME = np.array([6000.0, 4000.0])
-CAMERA = BrownCamera(
+CAMERA = SkyCamera(
     np.array([9012.0, 9009.5, 3018.0, 1987.0, -0.105, 0.092, -0.02, 4e-4, -3e-4]), np.zeros((9, 9))
 )
 FAINTEST, SD, MISSED, FALSE = 6.0, 0.1, 0.04, 0.03

@@ -120,7 +120,7 @@ def good(tmp_path_factory):
         for k, day in enumerate(("1970-01-15", "1971-01-20"))
     ]
     star_camera = folder / "camera.json"
-    star_camera.write_bytes(stellar.BrownCamera.of_field(6000, 4000, 0.6).to_json())
+    star_camera.write_bytes(stellar.SkyCamera.of_field(6000, 4000, 0.6).to_json())
     readings, deck, own_grid = folder / "readings.csv", folder / "deck.txt", folder / "grid.csv"
     readings.write_bytes(comparator.to_csv(session))
     deck.write_bytes(comparator.to_cards(session))
@@ -311,7 +311,6 @@ def good(tmp_path_factory):
         "photogram.stellar": {
             "Air": {"temperature": 280.0, "pressure": 760.0},
             "Axis": {"azimuth": 0.0, "zenith_distance": 0.0, "xy": np.zeros(2), "weight": np.eye(2)},
-            "BrownCamera": {"values": np.r_[9000.0, 9000.0, np.zeros(7)], "covariance": np.zeros((9, 9))},
             "Catalogue": {name: getattr(catalogue, name) for name in stellar.Catalogue.__dataclass_fields__},
             "Earth": {"dut1": -0.2, "pole": (1e-6, 2e-6)},
             "Effects": {"refraction": False},

@@ -8,14 +8,14 @@ import star_plates
 
 from message_codes import as_check, coded
 from photogram import InputError, adjust, camera_from, simulate
-from photogram.stellar import INDEX, NAMES, UNITS, BrownCamera, calibrate, camera_document
+from photogram.stellar import INDEX, NAMES, UNITS, SkyCamera, calibrate, camera_document
 
 VALUES = np.array([8000.0, 8010.0, 6010.0, 5990.0, -0.02, 0.004, -3e-4, 1e-4, -2e-4])
 SD = np.array([0.5, 0.5, 0.8, 0.8, 2e-4, 2e-4, 1e-5, 1e-5, 0.0])
 """p2 was held."""
 _FACTOR = np.tril(np.random.default_rng(4).uniform(-0.5, 0.5, (9, 9)), -1) + np.eye(9)
 _CORRELATED = _FACTOR @ _FACTOR.T / np.sqrt(np.outer(*[np.diag(_FACTOR @ _FACTOR.T)] * 2))
-CALIBRATED = BrownCamera(VALUES, _CORRELATED * np.outer(SD, SD))
+CALIBRATED = SkyCamera(VALUES, _CORRELATED * np.outer(SD, SD))
 
 
 def test_images_are_those_of_its_formula():
@@ -32,7 +32,7 @@ def test_images_are_those_of_its_formula():
 
 def test_it_is_an_observation_with_its_covariance():
     camera = CALIBRATED.as_camera("stars")
-    names = [name for name in CALIBRATED.NAMES if name != "p2"]
+    names = [name for name in CALIBRATED.names if name != "p2"]
     assert camera.parameters["k3"] == VALUES[6]
     assert {name: camera.deviations[camera.names.index(name)] for name in names} == dict(
         zip(names, SD[:8].tolist(), strict=True)

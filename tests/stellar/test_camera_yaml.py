@@ -7,10 +7,10 @@ import pytest
 from message_codes import as_check, coded
 from photogram import InputError
 from photogram.io.yaml_text import read_yaml_text
-from photogram.stellar import BrownCamera, SkyCamera, read_night, read_yaml, to_yaml
+from photogram.stellar import SkyCamera, read_night, read_yaml, to_yaml
 
 FRAME = (6000.0, 4000.0)
-BROWN = BrownCamera(
+BROWN = SkyCamera(
     np.array([9012.25, 9009.5, 3018.0, 1987.0, -0.105, 0.092, -0.02, 4e-4, -3e-4]),
     np.diag([0.15, 0.15, 0.5, 0.35, 1e-3, 0.01, 0.04, 1e-5, 1e-5]) ** 2,
 )

@@ -10,8 +10,8 @@ from message_codes import has_code
 from photogram import _photocore
 from photogram.cli import app
 from photogram.stellar import (
-    BrownCamera,
     Catalogue,
+    SkyCamera,
     apparent_places,
     calibrate_exposures,
     calibrate_night,
@@ -91,7 +91,7 @@ def test_the_failed_global_test_comes_first_and_the_camera_is_not_usable(folder)
 
 def test_a_fisheye_under_the_terms_of_brown_is_not_usable(night):
     """An equidistant lens of more than 100 degrees, its stars named."""
-    camera = BrownCamera.of_field(*night.frame, np.radians(130))
+    camera = SkyCamera.of_field(*night.frame, np.radians(130))
     exposures = []
     for given in night.exposures[:3]:
         bright = night.catalogue.brighter(5.0)

@@ -9,7 +9,7 @@ import pytest
 
 from message_codes import coded, has_code
 from photogram import InputError
-from photogram.stellar import BrownCamera, attitude_of, calibrate_night, read_night
+from photogram.stellar import SkyCamera, attitude_of, calibrate_night, read_night
 from photogram.stellar.places import axis_of, roll_of
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "exposures" / "night.toml"))
@@ -41,7 +41,7 @@ def pointed(night, change):
 
 def widened(night, factor):
     field = np.radians(36.9 * factor)
-    return replace(night, camera=BrownCamera.of_field(*night.frame, field))
+    return replace(night, camera=SkyCamera.of_field(*night.frame, field))
 
 
 @pytest.mark.parametrize(

@@ -6,11 +6,11 @@ import pytest
 from photogram.stellar import (
     ARCSEC,
     Air,
-    BrownCamera,
     Catalogue,
     Exposure,
     Night,
     Site,
+    SkyCamera,
     apparent_places,
     calibrate_night,
     project_sky,
@@ -36,7 +36,7 @@ def expose(bright, number, generator):
     is rough; the attitude is given a degree and a half wrong in direction, three in rotation.
     """
     utc = f"2024-03-01T2{number}:10:00"
-    places, camera = apparent_places(bright, utc), BrownCamera(TRUTH, np.zeros((9, 9)))
+    places, camera = apparent_places(bright, utc), SkyCamera(TRUTH, np.zeros((9, 9)))
     pixels = project_sky(camera, ATTITUDES[number], SITE, places, sidereal_time(SITE, utc))
     with np.errstate(invalid="ignore"):
         seen = np.flatnonzero(((pixels > 0) & (pixels < FRAME)).all(axis=1))
@@ -60,7 +60,7 @@ def calibrated(bright, seed):
         site=SITE,
         catalogue=bright,
         frame=FRAME,
-        camera=BrownCamera.of_field(*FRAME, 2 * np.arctan(3000 / 9000)),
+        camera=SkyCamera.of_field(*FRAME, 2 * np.arctan(3000 / 9000)),
         exposures=exposures,
         names=tuple("1234"),
         pixel_sd=SD,

@@ -10,7 +10,6 @@ from message_codes import coded
 from photogram import InputError, _photocore
 from photogram.stellar import (
     LENSES,
-    BrownCamera,
     SkyCamera,
     apparent_places,
     calibrate_night,
@@ -106,7 +105,7 @@ def test_cameras_of_lenses_come_back_from_their_files_and_in_blocks(tmp_path):
     assert both.camera.covariance[0, 0] < 0.75 * camera.covariance[0, 0]
     with pytest.raises(InputError, check=coded("stars.prior-lens")):
         calibrate_night(replace(night, camera=again, prior=again, common_scale=False))
-    file.write_bytes(BrownCamera.of_field(10, 10, 1.0).to_json().replace(b"brown camera", b"red camera"))
+    file.write_bytes(SkyCamera.of_field(10, 10, 1.0).to_json().replace(b"brown camera", b"red camera"))
     with pytest.raises(
         InputError, check=coded("error.choice", value="red camera", names=["brown camera", "sky camera"])
     ):

@@ -18,10 +18,10 @@ from photogram.network.neighbours import mutually_nearest
 from photogram.stellar import (
     ARCSEC,
     Air,
-    BrownCamera,
     Catalogue,
     Earth,
     Site,
+    SkyCamera,
     apparent_places,
     attitude_of,
     calibrate_exposures,
@@ -194,7 +194,7 @@ def test_attitudes_are_those_of_the_mean_pole(night):
     earth, bright, utc = Earth(0.3, (30 * ARCSEC, -60 * ARCSEC)), night.catalogue, "2024-03-05T20:10:00"
     date, attitude = earth.site_of_date(night.site), night.exposures[0].attitude
     time = sidereal_time(date, utc, earth.dut1)
-    camera = BrownCamera(TRUTH, np.zeros((9, 9)))
+    camera = SkyCamera(TRUTH, np.zeros((9, 9)))
     pixels = project_sky(camera, attitude, date, apparent_places(bright, utc), time)
     with np.errstate(invalid="ignore"):
         seen = np.flatnonzero(((pixels > 0) & (pixels < MAKER["FRAME"])).all(axis=1))
@@ -231,7 +231,7 @@ def test_attitudes_are_those_of_the_mean_pole(night):
 @pytest.mark.parametrize(("azimuth", "elevation"), [(0, 30), (90, 50), (180, 20), (270, 70), (123, 45)])
 def test_rough_attitudes_from_azimuth_elevation_roll(azimuth, elevation):
     """What is east of a camera that looks south is on its left; what is above is on top."""
-    camera = BrownCamera.of_field(6000, 4000, 0.6)
+    camera = SkyCamera.of_field(6000, 4000, 0.6)
     attitude = attitude_of(*np.radians([azimuth, elevation]))
     assert np.degrees(axis_of(attitude)) == pytest.approx((azimuth, elevation))
     site = Site(np.radians(47.0), air=Air(280.0, 0.0), aberration=0.0)
@@ -320,8 +320,8 @@ def test_mean_errors_of_the_catalogue():
 def test_report_and_document(result):
     document = json.loads(result.to_json())
     assert [*map(str, result.messages)] == document["messages"]
-    assert set(document["parameters"]) == set(BrownCamera.NAMES)
-    assert document["covariance"]["order"] == list(BrownCamera.NAMES)
+    assert set(document["parameters"]) == set(result.camera.names)
+    assert document["covariance"]["order"] == list(result.camera.names)
     assert len(document["exposures"]) == 5
     assert {"exposure", "star", "residual_px", "redundancy", "standardized"} <= set(document["images"][0])
     redundancy = sum(sum(image["redundancy"]) for image in document["images"])
@@ -346,7 +346,7 @@ def test_command_line(tmp_path, monkeypatch):
         "correlations.png",
         "distortion.png",
     }
-    camera = BrownCamera.read(tmp_path / "night-calibrated" / "camera.json")
+    camera = SkyCamera.read(tmp_path / "night-calibrated" / "camera.json")
     assert camera.known.all()
     assert json.loads((tmp_path / "r.json").read_text())["converged"]
 

@@ -16,9 +16,9 @@ from photogram.stellar import (
     ARCSEC,
     INDEX,
     NAMES,
-    BrownCamera,
     Options,
     PlateCamera,
+    SkyCamera,
     calibrate,
     camera_document,
     read_plain,
@@ -213,7 +213,7 @@ def test_a_plate_camera_comes_back_from_its_file(plate, tmp_path):
     assert set(document["orientation"]["station"]) == {"pre", "post", "event"}
     assert len(document["full_covariance"]["order"]) == 22
     with pytest.raises(InputError, check=coded("error.choice", value="stellar camera")):
-        BrownCamera.read(tmp_path / "camera.json")
+        SkyCamera.read(tmp_path / "camera.json")
     with pytest.raises(InputError, match="cannot be read"):
         PlateCamera.read(tmp_path / "nowhere.json")
 

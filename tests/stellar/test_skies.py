@@ -12,10 +12,10 @@ from photogram import AdjustmentError, InputError
 from photogram.stellar import (
     ARCSEC,
     Air,
-    BrownCamera,
     Catalogue,
     Exposure,
     Site,
+    SkyCamera,
     apparent_places,
     calibrate_exposures,
     project_sky,
@@ -24,7 +24,7 @@ from photogram.stellar import (
 
 SITE = Site(np.radians(47.0), np.radians(-8.5), 500.0, Air(283.15, 715.0), aberration=0.3192 * ARCSEC)
 FRAME = (6000.0, 4000.0)
-TRUTH = BrownCamera(
+TRUTH = SkyCamera(
     np.array([9010.0, 8995.0, 3015.0, 1988.0, -0.11, 0.09, -0.02, 4e-4, -3e-4]), np.zeros((9, 9))
 )
 
@@ -64,14 +64,14 @@ def test_directions_agree_with_erfa_without_air(catalogue):
 
 
 def test_a_camera_comes_back_from_its_file(tmp_path):
-    camera = BrownCamera(TRUTH.values, np.diag(np.arange(1.0, 10.0)))
+    camera = SkyCamera(TRUTH.values, np.diag(np.arange(1.0, 10.0)))
     (tmp_path / "camera.json").write_bytes(camera.to_json())
-    again = BrownCamera.read(tmp_path / "camera.json")
+    again = SkyCamera.read(tmp_path / "camera.json")
     assert (again.values == camera.values).all()
     assert (again.covariance == camera.covariance).all()
     (tmp_path / "other.json").write_text("{}")
     with pytest.raises(InputError, check=coded("error.at", what="error.document")):
-        BrownCamera.read(tmp_path / "other.json")
+        SkyCamera.read(tmp_path / "other.json")
 
 
 def test_few_and_many_exposures_have_the_same_covariance(catalogue):
@@ -105,7 +105,7 @@ def test_a_hundred_exposures_adjust(catalogue):
             deep, f"2024-03-01T{number // 60 + 20}:{number % 60:02d}:00", attitude, generator, places=places
         )
         exposures.append(replace(made, xy=made.xy[:2000], stars=made.stars[:2000]))
-    result = calibrate_exposures(exposures, BrownCamera.of_field(*FRAME, 0.6435), SITE, deep)
+    result = calibrate_exposures(exposures, SkyCamera.of_field(*FRAME, 0.6435), SITE, deep)
     assert result.status == "converged"
     errors = np.sqrt(np.diag(result.camera.covariance))
     assert np.abs((result.camera.values - TRUTH.values) / errors).max() < 3.5

@@ -58,6 +58,11 @@ def _names() -> tuple[str, ...]:
     return tuple(name for name in _photocore.CAMERAS if not name.endswith(_MEASURED))
 
 
+def parameter_names(model: str) -> tuple[str, ...]:
+    """Return the names of the parameters of a model, in its order."""
+    return tuple(name for name, _ in _models()[model][1])
+
+
 def _model(name: str, value: str) -> str:
     one_of(name, value, _names())
     return value
@@ -149,7 +154,7 @@ class Camera(Valued, Brief):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the k parameters, in the order of the model."""
-        return tuple(name for name, _ in self._facts[1])
+        return parameter_names(self.model)
 
     @property
     def knot_names(self) -> tuple[str, ...]:

@@ -31,7 +31,6 @@ from .sky_calibration import Exposure as Exposure
 from .sky_calibration import calibrate_exposures as calibrate_exposures
 from .sky_calibration import project_sky as project_sky
 from .sky_cameras import LENSES as LENSES
-from .sky_cameras import BrownCamera as BrownCamera
 from .sky_cameras import SkyCamera as SkyCamera
 from .sky_cameras import read_yaml as read_yaml
 from .sky_cameras import to_yaml as to_yaml

@@ -17,10 +17,9 @@ from photogram.errors import InputError
 from photogram.io.json import read_json, to_json
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera
-from photogram.stellar.parameters import GROUPS, INDEX, INTERIOR, UNITS
-from photogram.stellar.places import transformed_angles
+from photogram.stellar.parameters import INDEX, INTERIOR, UNITS
 from photogram.stellar.problem import Problem
-from photogram.stellar.sky_cameras import SkyCamera, read_camera, weight_of
+from photogram.stellar.sky_cameras import SkyCamera, camera_of_blocks, read_camera, weight_of
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -132,18 +131,13 @@ class PlateCamera(Checked):
             Whether parameters are weighted by their full covariance; otherwise they are fixed. Fixed
             parameters remain fixed.
         """
-        truth_value("weighted", weighted)
         scale = np.array([_METRE ** _POWERS[UNITS[each]] for each in INTERIOR])
         values, covariance = self.values * scale, self.covariance * np.outer(scale, scale)
         if self.common_scale:
             values[INTERIOR.index("cy")] = 0.0
-        names = [_IN_MODEL.get(each, each) for each in INTERIOR]
-        parameters = dict(zip(names, values.tolist(), strict=True)) | {"c0": _METRE * self.distortion_first}
-        known = np.flatnonzero(np.diag(covariance) > 0)
-        if not (weighted and known.size):
-            return Camera("plate", parameters, name=name)
-        observed = [names[row] for row in known], covariance[np.ix_(known, known)]
-        return Camera("plate", parameters, covariance=observed, name=name)
+        names = [*(_IN_MODEL.get(each, each) for each in INTERIOR), "c0"]
+        values = np.append(values, _METRE * self.distortion_first)
+        return camera_of_blocks("plate", names, values, np.pad(covariance, (0, 1)), name, weighted)
 
     def as_prior(self, problem: Problem, unit: float | None = None) -> Problem:
         """Return a calibration that uses this camera as a weighted prior.
@@ -217,20 +211,13 @@ def camera_document(result: Result) -> bytes:
     result = result.combined or result
     problem = result.problem
     site, options = problem.site, problem.options
-    groups = [g for g in range(3) if result.solved.free[3 * g : 3 * g + 3].any()]
     chosen = [INDEX[name] for name in result.estimated]
-    angles = {GROUPS[g]: result.solved.parameters[3 * g : 3 * g + 3] for g in groups}
     document = PlateCamera.of(result).document() | {
         "orientation": {
             "unit": "rad",
             "order": ["alpha", "omega", "kappa"],
-            "station": angles,
-            "reference": None
-            if options.reference is None
-            else {
-                group: transformed_angles(own, site, options.reference, options.pole)
-                for group, own in angles.items()
-            },
+            "station": {name: result.attitude(name) for name in result.groups},
+            "reference": options.reference and result.transformed_attitudes(),
         },
         "station": {
             "number": site.number,

@@ -85,9 +85,9 @@ class RefractionCurves:
     error: Floats
 
 
-def refraction_curves(result: Result, group: int) -> RefractionCurves:
-    """Compute refraction around the axis of a group (0 pre, 1 post, 2 event)."""
-    alpha, omega, _ = result.solved.parameters[3 * group : 3 * group + 3]
+def refraction_curves(result: Result, group: str) -> RefractionCurves:
+    """Compute refraction around the axis of an orientation (`pre`, `post`, `event`)."""
+    alpha, omega, _ = result.attitude(group)
     axis = float(np.arccos(np.cos(alpha) * np.cos(omega)))
     z = axis + np.radians(np.arange(-10.0, 11.0))
     z = z[(z >= 0) & (z < np.pi / 2)]

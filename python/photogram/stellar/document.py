@@ -147,7 +147,7 @@ def _members(result: Result) -> dict[str, Any]:
 def _solution_members(result: Result) -> dict[str, Any]:
     estimated = [INDEX[name] for name in result.estimated]
     options, residual = result.problem.options, result.solved.axis_residual
-    groups, angle = tables.solved_groups(result) if options.refraction else {}, options.comparator_angle
+    groups, angle = result.groups if options.refraction else (), options.comparator_angle
     return {
         **members(result, "degrees_of_freedom", "counts", m="mean_error", m_computed="computed_mean_error"),
         "m_unit": "m",
@@ -157,10 +157,10 @@ def _solution_members(result: Result) -> dict[str, Any]:
             "matrix": result.covariance[np.ix_(estimated, estimated)],
         },
         "axis_residual_um": None if residual is None else 1e6 * residual,
-        "transformed": options.reference and tables.transformed_attitudes(result),
+        "transformed": options.reference and result.transformed_attitudes(),
         "comparator_frame": None if angle is None else comparator_frame(result, angle),
         "distortion_curves": distortion_curves(result) if options.curves else None,
-        "refraction_curves": {name: refraction_curves(result, g) for name, g in groups.items()},
+        "refraction_curves": {name: refraction_curves(result, name) for name in groups},
     }
 
 

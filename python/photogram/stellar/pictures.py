@@ -139,12 +139,12 @@ def night_drawings(result: CalibratedNight) -> Layers:
 def _refraction(result: Result) -> Plot:
     marks: list[Mark] = []
     ends = []
-    for group in np.flatnonzero(result.solved.free[:9:3]).tolist():
+    for colour, group in zip(COLOURS, result.groups, strict=False):
         found = refraction_curves(result, group)
         z, change = np.degrees(found.zenith_distance), (found.corrected - found.given) / ARCSEC
         low, high = change - found.error / ARCSEC, change + found.error / ARCSEC
-        marks.append(band(z, low, high, COLOURS[group], 0.2))
-        marks.append(Line(np.column_stack([z, change]), COLOURS[group], label=f"field of {GROUPS[group]}"))
+        marks.append(band(z, low, high, colour, 0.2))
+        marks.append(Line(np.column_stack([z, change]), colour, label=f"field of {group}"))
         ends.append([z, low, high])
     z, low, high = np.concatenate(ends, axis=1)
     panel = Panel(

@@ -18,7 +18,8 @@ from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.camera_tables import correlated, correlation_remarks, correlations, significance
 from photogram.stellar.cameras import PlateCamera
 from photogram.stellar.directions import Directions, directions, mean_error_ellipses
-from photogram.stellar.parameters import DISTORTION, INDEX, NAMES, SIGNIFICANT
+from photogram.stellar.parameters import DISTORTION, GROUPS, INDEX, NAMES, SIGNIFICANT
+from photogram.stellar.places import transformed_angles
 from photogram.stellar.problem import Counts, Problem
 from photogram.stellar.state import Level, PreRun, Solved, Stage
 from photogram.words import Phrase, phrase
@@ -123,6 +124,25 @@ class Result(Judged, Documented):
         """
         truth_value("weighted", weighted)
         return PlateCamera.of(self).as_camera(name, weighted=weighted)
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Orientations (`pre`, `post`, `event`) with an estimated attitude."""
+        free = self.solved.free[:9].reshape(3, 3).any(axis=1)
+        return tuple(name for name, estimated in zip(GROUPS, free, strict=True) if estimated)
+
+    def attitude(self, group: str) -> Floats:
+        """Return alpha, omega, kappa (3,) of an orientation, radians."""
+        first = 3 * GROUPS.index(group)
+        return self.solved.parameters[first : first + 3]
+
+    def transformed_attitudes(self) -> dict[str, Floats]:
+        """Return attitudes at the reference station and mean pole, if one is given."""
+        site, options = self.problem.site, self.problem.options
+        if (reference := options.reference) is None:
+            return {}
+        angles = {name: self.attitude(name) for name in self.groups}
+        return {name: transformed_angles(own, site, reference, options.pole) for name, own in angles.items()}
 
     @property
     def estimated(self) -> list[str]:

@@ -242,7 +242,7 @@ def partials(
     images = _Images(exposures, place, catalogue, earth.dut1, False)
     core = _core(images, exposures, camera, place, np.ones(len(camera.values), bool), None, 1.0)
     equations = core.equations()
-    return equations["pointing"], equations["common"][:, :, list(camera.facts.places)]
+    return equations["pointing"], equations["common"][:, :, camera.facts.places]
 
 
 class _Images:
@@ -322,7 +322,7 @@ def _result(
 ) -> SkyCalibration:
     mean_error = math.sqrt(sum(found["sums_of_squares"]) / freedom) if freedom > 0 else 1.0
     held = ~images.weighted[:, None]
-    place, variance = list(camera.facts.places), mean_error**2
+    place, variance = camera.facts.places, mean_error**2
     parameters = found["parameters"]
     with np.errstate(over="ignore"):
         covariance = variance * found["common_cofactors"][np.ix_(place, place)]

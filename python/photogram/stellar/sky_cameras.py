@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any, Literal, Self, get_args
 
@@ -18,9 +19,9 @@ from photogram.errors import InputError
 from photogram.io.json import read_json, to_json
 from photogram.io.tree import Tree
 from photogram.io.yaml_text import camera_info, matrix_lines, read_yaml_text
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import unknown_name
-from photogram.network.cameras import Camera
+from photogram.network.cameras import Camera, parameter_names
 from photogram.stellar.parameters import COMMON, INTERIOR
 from photogram.stellar.sky import TAU
 from photogram.words import phrase
@@ -33,63 +34,46 @@ class Lens:
     model: str  # Camera model of `docs/cameras.md`
     # Parameters in the order of reports and files, fx, fy, cx, cy first; missing model parameters are zero
     names: tuple[str, ...]
-    order: tuple[str, ...]  # All parameters of the model, in its order
-    # Distance from the principal point in principal distances, without lens terms, for an axis angle
-    # (radians)
-    radius: Callable[[float], float]
-    formula: str  # The radius formula for reports
-    widest: float  # The field of view (radians) at and above which images are undefined
-    # Terms that are zero unless given in a camera file: without them the lens is the named projection
-    held: tuple[str, ...] = ()
+    formula: str  # Distance from the principal point in principal distances, for reports
+    widest: float = math.tau  # The field of view (radians) at and above which images are undefined
     # Groups of terms for tests, in the order of removal if insignificant
     groups: tuple[tuple[str, ...], ...] = ()
 
     @property
-    def places(self) -> tuple[int, ...]:
+    def order(self) -> tuple[str, ...]:
+        """All parameters of the model, in its order."""
+        return parameter_names(self.model)
+
+    @property
+    def places(self) -> list[int]:
         """Indices of the parameters in the model."""
-        return tuple(self.order.index(name) for name in self.names)
+        return [self.order.index(name) for name in self.names]
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        """Terms that are zero unless a camera file sets them: without them the lens is the projection."""
+        return tuple(name for name in self.names[4:] if name not in chain(*self.groups))
 
 
 _SQUARE = ("fx", "fy", "cx", "cy")
-_TWO_TERMS = (*_SQUARE, "k1", "k2")
-_FISHEYE = (*_SQUARE, "k1", "k2", "k3", "k4")
+_BROWN = ("k1", "k2", "p1", "p2", "k3")
+_KANNALA_BRANDT = ("k1", "k2", "k3", "k4")
 
 LENSES: dict[str, Lens] = {
     "brown": Lens(
         "full_opencv",
         (*_SQUARE, "k1", "k2", "k3", "p1", "p2"),
-        (*_SQUARE, "k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"),
-        math.tan,
         "tan theta (1 + k1 r^2 + k2 r^4 + k3 r^6) and decentering",
         math.pi,
-        groups=(("k3",), ("k2",), ("k1",), ("p1", "p2")),
+        (("k3",), ("k2",), ("k1",), ("p1", "p2")),
     ),
-    "equidistant": Lens("opencv_fisheye", _SQUARE, _FISHEYE, lambda theta: theta, "theta", math.tau),
-    "equisolid": Lens(
-        "equisolid",
-        _TWO_TERMS,
-        _TWO_TERMS,
-        lambda theta: 2 * math.sin(0.5 * theta),
-        "2 sin(theta/2)",
-        math.tau,
-        held=("k1", "k2"),
-    ),
-    "stereographic": Lens(
-        "stereographic",
-        _TWO_TERMS,
-        _TWO_TERMS,
-        lambda theta: 2 * math.tan(0.5 * theta),
-        "2 tan(theta/2)",
-        math.tau,
-        held=("k1", "k2"),
-    ),
+    "equidistant": Lens("opencv_fisheye", _SQUARE, "theta"),
+    "equisolid": Lens("equisolid", (*_SQUARE, "k1", "k2"), "2 sin(theta/2)"),
+    "stereographic": Lens("stereographic", (*_SQUARE, "k1", "k2"), "2 tan(theta/2)"),
     "kannala_brandt": Lens(
         "opencv_fisheye",
-        _FISHEYE,
-        _FISHEYE,
-        lambda theta: theta,
+        (*_SQUARE, *_KANNALA_BRANDT),
         "theta (1 + k1 theta^2 + k2 theta^4 + k3 theta^6 + k4 theta^8)",
-        math.tau,
         groups=(("k4",), ("k3",), ("k2",), ("k1",)),
     ),
 }
@@ -135,6 +119,16 @@ def read_camera(document: Tree, names: Sequence[str]) -> tuple[Floats, Floats]:
     covariance = np.zeros((len(names), len(names)))
     covariance[np.ix_(rows, rows)] = block
     return np.array([value.number() for value in values]), covariance
+
+
+def camera_of_blocks(
+    model: str, names: Sequence[str], values: Floats, covariance: Floats, name: str, weighted: bool
+) -> Camera:
+    """Return a camera with parameters weighted by their covariance; those with zero variance are fixed."""
+    truth_value("weighted", weighted)
+    rows = np.flatnonzero((np.diag(covariance) > 0) & weighted)
+    observed = ([names[row] for row in rows], covariance[np.ix_(rows, rows)]) if rows.size else None
+    return Camera(model, dict(zip(names, values.tolist(), strict=True)), covariance=observed, name=name)
 
 
 _EQUAL = 1e-4  # Allowed difference of fy and fx in blocks, pixels, if the two were one parameter
@@ -188,10 +182,12 @@ class SkyCamera:
         if not 0 < field_of_view < facts.widest:
             field, widest = math.degrees(field_of_view), math.degrees(facts.widest)
             raise InputError(phrase("stars.field-of-view", field=field, lens=lens, widest=widest))
-        f = 0.5 * width / facts.radius(0.5 * field_of_view)
         values = np.zeros(len(facts.names))
-        values[:4] = f, f, 0.5 * width, 0.5 * height
-        return cls(values, np.zeros((len(values), len(values))), lens)
+        values[:2] = 1.0
+        camera = cls(values, np.zeros((len(values), len(values))), lens)
+        edge = camera.images(np.array([[math.sin(0.5 * field_of_view), 0.0, math.cos(0.5 * field_of_view)]]))
+        f = 0.5 * width / float(edge[0, 0])
+        return replace(camera, values=np.array([f, f, 0.5 * width, 0.5 * height, *values[4:]]))
 
     @property
     def facts(self) -> Lens:
@@ -212,7 +208,7 @@ class SkyCamera:
     def model_values(self) -> Floats:
         """The parameters of the model of `docs/cameras.md`, in its order."""
         values = np.zeros(len(self.facts.order))
-        values[list(self.facts.places)] = self.values
+        values[self.facts.places] = self.values
         return values
 
     @property
@@ -243,7 +239,7 @@ class SkyCamera:
     def partials(self, rays: Floats) -> Floats:
         """Return partials (n, 2, k), pixels, of images of directions by the parameters."""
         _, _, found = _photocore.camera_partials(self.facts.model, self.model_values, _turned(rays))
-        return np.asarray(found[:, :, list(self.facts.places)], float)
+        return np.asarray(found[:, :, self.facts.places], float)
 
     def largest_angle(self, frame: tuple[float, float]) -> float:
         """Return the largest axis angle (rad) in a frame; pi if undefined for a part."""
@@ -263,19 +259,11 @@ class SkyCamera:
             Whether parameters are weighted by their full covariance; otherwise they are fixed. Fixed
             parameters remain fixed. With a common scale, fy equals fx within a ten-thousandth of a pixel.
         """
-        truth_value("weighted", weighted)
-        names, model = self.names, self.facts.model
-        values = dict(zip(names, self.values.tolist(), strict=True))
-        if not (weighted and self.known.any()):
-            return Camera(model, values, name=name)
-        matrix, known = self.covariance.copy(), self.known
-        if self.common_scale and known[0]:
+        matrix = self.covariance.copy()
+        if self.common_scale and self.known[0]:
             matrix[1, :], matrix[:, 1] = matrix[0, :], matrix[:, 0]
             matrix[1, 1] = matrix[0, 0] + _EQUAL**2
-            known = known | (np.arange(len(names)) == 1)
-        rows = np.flatnonzero(known)
-        covariance = [names[i] for i in rows], matrix[np.ix_(rows, rows)]
-        return Camera(model, values, covariance=covariance, name=name)
+        return camera_of_blocks(self.facts.model, self.names, self.values, matrix, name, weighted)
 
     def document(self) -> dict[str, Any]:
         """Return the members of the JSON document."""
@@ -295,7 +283,7 @@ class SkyCamera:
         return to_json(self.document())
 
     @classmethod
-    def read(cls, path: Path) -> SkyCamera:
+    def read(cls, path: Path) -> Self:
         """Read a camera file of `to_json`.
 
         Raises
@@ -307,35 +295,18 @@ class SkyCamera:
         document["kind"].choice(_KINDS)
         lens = document.get("lens", "brown").choice(LENSES)
         values, covariance = read_camera(document, LENSES[lens].names)
-        of = BrownCamera if lens == "brown" else SkyCamera
-        return of(values, covariance, lens, document.get("common_scale", False).value is True)
+        return cls(values, covariance, lens, document.get("common_scale", False).value is True)
 
 
 def _turned(rays: Floats) -> Floats:
     return np.ascontiguousarray(np.asarray(rays, float) * (1.0, -1.0, -1.0))
 
 
-class BrownCamera(SkyCamera):
-    """Pinhole camera with Brown's distortion: `SkyCamera` of the lens `brown`.
-
-    With (u, v) = (X, Y) / Z and r^2 = u^2 + v^2,
-
-        x = fx (u (1 + k1 r^2 + k2 r^4 + k3 r^6) + 2 p1 u v + p2 (r^2 + 2 u^2)) + cx.
-
-    The formula of y has fy, cy, and p1, p2 exchanged. `values` are fx, fy, cx, cy, k1, k2, k3, p1, p2.
-    """
-
-    NAMES = LENSES["brown"].names
-
-
 YamlForm = Literal["opencv", "ros"]  # Format of the file
 
-_BROWN = ("k1", "k2", "p1", "p2", "k3")
-_KANNALA_BRANDT = ("k1", "k2", "k3", "k4")
-_ROS = {"plumb_bob": _BROWN, "equidistant": _KANNALA_BRANDT}
-_LENSES = {"brown": ("plumb_bob", _BROWN), "kannala_brandt": ("equidistant", _KANNALA_BRANDT)}
-_LENSES["equidistant"] = _LENSES["kannala_brandt"]
-WITH_YAML = frozenset(_LENSES)  # Lenses supported in YAML
+_MODELS = {"plumb_bob": ("brown", _BROWN), "equidistant": ("kannala_brandt", _KANNALA_BRANDT)}
+_OF_LENSES = {"brown": "plumb_bob", "equidistant": "equidistant", "kannala_brandt": "equidistant"}
+WITH_YAML = frozenset(_OF_LENSES)  # Lenses supported in YAML
 _MATRIX = ("camera_matrix", "Camera_Matrix", "K")
 _DISTORTION = ("distortion_coefficients", "Distortion_Coefficients", "dist_coeffs", "D")
 
@@ -361,21 +332,18 @@ def to_yaml(camera: SkyCamera, frame: tuple[float, float], form: YamlForm, name:
     InputError
         If the lens is not supported.
     """
-    if camera.lens not in _LENSES:
-        raise InputError(phrase("stars.no-yaml", lens=camera.lens, lenses=list(_LENSES)))
-    model, terms = _LENSES[camera.lens]
-    values = dict(zip(camera.names, camera.values.tolist(), strict=True))
-    sd = np.sqrt(np.diag(camera.covariance))
-    errors = dict(zip(camera.names, sd.tolist(), strict=True))
-    if camera.common_scale:
-        errors["fy"] = errors["fx"]
-    matrix = np.array([[values["fx"], 0, values["cx"]], [0, values["fy"], values["cy"]], [0, 0, 1]], float)
-    coefficients = [values.get(term, 0.0) for term in terms]
-    width, height = round(frame[0]), round(frame[1])
+    if camera.lens not in _OF_LENSES:
+        raise InputError(phrase("stars.no-yaml", lens=camera.lens, lenses=list(_OF_LENSES)))
     one_of("form", form, get_args(YamlForm))
+    model = _OF_LENSES[camera.lens]
+    order = (*_SQUARE, *_MODELS[model][1])
+    known = camera.as_camera()
+    sd = dict(zip(known.names, known.deviations.tolist(), strict=True))
+    fx, fy, cx, cy, *coefficients = (known.parameters[name] for name in order)
+    matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
+    width, height = round(frame[0]), round(frame[1])
     if form == "ros":
         return camera_info(name, (width, height), matrix, (model, coefficients))
-    order = ("fx", "fy", "cx", "cy", *terms)
     lines = [
         "%YAML:1.0",
         "---",
@@ -385,7 +353,7 @@ def to_yaml(camera: SkyCamera, frame: tuple[float, float], form: YamlForm, name:
         *matrix_lines("camera_matrix", matrix, opencv=True),
         *matrix_lines("distortion_coefficients", [coefficients], opencv=True),
         f"# of {', '.join(order)}",
-        *matrix_lines("standard_deviations", [[errors.get(term, 0.0) for term in order]], opencv=True),
+        *matrix_lines("standard_deviations", [[sd[name] for name in order]], opencv=True),
     ]
     return ("\n".join(lines) + "\n").encode()
 
@@ -414,23 +382,21 @@ def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
     )
     if values[0, 1] or not np.array_equal(values[[1, 2, 2, 2], [0, 0, 1, 2]], [0, 0, 0, 1]):
         raise matrix.error(phrase("stars.camera-matrix", value=str(values.tolist())))
-    fisheye = _is_fisheye(content)
-    terms = _KANNALA_BRANDT if fisheye else _BROWN
+    lens, terms = _MODELS[_model_in(content)]
     if any(coefficients[len(terms) :]):
         raise distortion.error(phrase("stars.more-terms", terms=list(terms)))
     parameters = {"fx": values[0, 0], "fy": values[1, 1], "cx": values[0, 2], "cy": values[1, 2]}
     parameters |= dict(zip(terms, [*coefficients, *[0.0] * len(terms)], strict=False))
-    of, lens = (SkyCamera, "kannala_brandt") if fisheye else (BrownCamera, "brown")
-    empty = of.of_field(*frame, 1.0, lens)
-    return of(np.array([parameters[name] for name in empty.names]), empty.covariance, lens), frame
+    found = np.array([parameters[name] for name in LENSES[lens].names])
+    return SkyCamera(found, np.zeros((len(found), len(found))), lens), frame
 
 
 def _member(content: Tree, *keys: str) -> Tree:
     return content[next((key for key in keys if key in content), keys[0])]
 
 
-def _is_fisheye(content: Tree) -> bool:
-    """Return whether the file specifies a fisheye model."""
+def _model_in(content: Tree) -> str:
+    """Return the distortion model that a file specifies."""
     if "distortion_model" in content:
-        return content["distortion_model"].choice(_ROS) == "equidistant"
-    return content.get("fisheye_model", 0).value not in (0, False)
+        return content["distortion_model"].choice(_MODELS)
+    return "plumb_bob" if content.get("fisheye_model", 0).value in (0, False) else "equidistant"

@@ -36,7 +36,6 @@ from photogram.stellar.curves import (
 from photogram.stellar.directions import mean_error_ellipses
 from photogram.stellar.movement import fictitious_points
 from photogram.stellar.parameters import GRAD, GROUPS, NAMES, UNITS
-from photogram.stellar.places import transformed_angles
 from photogram.stellar.problem import Counts
 
 if TYPE_CHECKING:
@@ -110,32 +109,14 @@ def stages(result: Result) -> list[Table]:
     return [Table("solutions", "Solutions", columns, note), Table("iterations", "Iterations", levels)]
 
 
-def transformed_attitudes(result: Result) -> dict[str, Floats]:
-    """Return attitudes at the reference station and mean pole, if one is given."""
-    options, site = result.problem.options, result.problem.site
-    if options.reference is None:
-        return {}
-    angles = result.solved.parameters[:9].reshape(3, 3)
-    return {
-        name: transformed_angles(angles[g], site, options.reference, options.pole)
-        for name, g in solved_groups(result).items()
-    }
-
-
 def transformed(result: Result) -> Table:
     """Return the transformed attitudes."""
-    attitudes = transformed_attitudes(result)
+    attitudes = result.transformed_attitudes()
     columns = [
         names_column(attitudes, "Orientation"),
         column([*attitudes.values()], GRADS, "{}", 9, parts="alpha, omega, kappa"),
     ]
     return Table("transformed-angles", "Transformed angles", columns)
-
-
-def solved_groups(result: Result) -> dict[str, int]:
-    """Return the orientations with an estimated attitude, by name."""
-    free = result.solved.free[:9].reshape(3, 3)
-    return {name: g for g, name in enumerate(GROUPS) if free[g].any()}
 
 
 def stars(result: Result) -> Table:
@@ -335,9 +316,9 @@ def distortion(result: Result) -> Table:
 
 def refraction(result: Result) -> Table:
     """Return refraction around the axes for given and corrected coefficients."""
-    groups = solved_groups(result) if result.problem.options.refraction else {}
-    curves = [refraction_curves(result, group) for group in groups.values()]
-    names = np.repeat([*groups], [len(curve.zenith_distance) for curve in curves])
+    groups = result.groups if result.problem.options.refraction else ()
+    curves = [refraction_curves(result, group) for group in groups]
+    names = np.repeat(groups, [len(curve.zenith_distance) for curve in curves])
     columns = [names_column(names, "Orientation")]
     for name, head, unit, decimals in (
         ("zenith_distance", "Zenith distance", DEGREES, 3),
