@@ -34,7 +34,7 @@ from photogram.stellar.night_calibration import calibrate_night
 from photogram.stellar.night_result import CalibratedNight, Night
 from photogram.stellar.places import apparent_places, attitude_of, sidereal_time
 from photogram.stellar.sky_calibration import Exposure, project_sky
-from photogram.stellar.sky_cameras import BrownCamera
+from photogram.stellar.sky_cameras import SkyCamera
 
 FAINTEST, FALSE, MISSED, SD = 6.0, 0.30, 0.10, 0.1
 WIDTH, HEIGHT = 6000.0, 4000.0
@@ -70,7 +70,7 @@ def make(seed: int) -> Sky:
         [focal, focal * generator.normal(1, 1e-3), *generator.normal((3000, 2000), 15), 0, 0, 0, 0, 0]
     )
     values[4:] = generator.normal((-0.08, 0.05, 0.0, 0, 0), (0.03, 0.03, 0.01, 3e-4, 3e-4))
-    truth = BrownCamera(values, np.zeros((9, 9)))
+    truth = SkyCamera(values, np.zeros((9, 9)))
     largest = 8.0 if seed % 5 == 4 else 1.5
     roll = "known" if seed % 2 == 0 else "unknown, not said" if seed % 20 == 19 else "unknown"
     exposures, stars = [], {}
@@ -91,7 +91,7 @@ def make(seed: int) -> Sky:
         site=SITE,
         catalogue=catalogue,
         frame=(WIDTH, HEIGHT),
-        camera=BrownCamera.of_field(WIDTH, HEIGHT, 2 * np.arctan(WIDTH / 2 / focal) * (1 + error)),
+        camera=SkyCamera.of_field(WIDTH, HEIGHT, 2 * np.arctan(WIDTH / 2 / focal) * (1 + error)),
         exposures=exposures,
         names=tuple(stars),
         pixel_sd=SD,
@@ -103,7 +103,7 @@ def make(seed: int) -> Sky:
 
 
 def _expose(
-    camera: BrownCamera, bright: Catalogue, utc: str, angles: np.ndarray, generator: np.random.Generator
+    camera: SkyCamera, bright: Catalogue, utc: str, angles: np.ndarray, generator: np.random.Generator
 ) -> tuple[Exposure, np.ndarray]:
     """Return an exposure, and the star of every image: -1 for the false ones."""
     attitude = attitude_of(*angles)

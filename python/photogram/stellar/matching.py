@@ -241,24 +241,14 @@ def chance(images: int, fixing: int, mu: float, matched: int) -> float:
 
 
 def binomial_tail(trials: int, probability: float, least: int) -> float:
-    """Return the binomial probability of at least `least` successes."""
-    if least <= 0:
-        return 1.0
+    """Return the binomial probability of at least `least` successes, a probability of F."""
+    if least <= 0 or probability >= 1:
+        return float(least <= trials)
     if least > trials or probability <= 0:
         return 0.0
-    if probability >= 1:
-        return 1.0
-    log_p, log_q = math.log(probability), math.log1p(-probability)
-    terms = [
-        math.lgamma(trials + 1)
-        - math.lgamma(k + 1)
-        - math.lgamma(trials - k + 1)
-        + k * log_p
-        + (trials - k) * log_q
-        for k in range(least, trials + 1)
-    ]
-    largest = max(terms)
-    return min(1.0, math.exp(largest) * math.fsum(math.exp(term - largest) for term in terms))
+    failures = trials - least + 1
+    ratio = (1 - probability) * least / (probability * failures)
+    return _photocore.fisher(ratio, 2.0 * failures, 2.0 * least)
 
 
 def expected_false(images: int, fixing: int, mu: float, matched: int, hypotheses: float) -> float:

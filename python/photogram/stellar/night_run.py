@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.stellar.comparison import fewer_stars, held_out
 from photogram.stellar.identification import STARS_OF_AN_ATTITUDE, attitude_radius, identify, identify_again
-from photogram.stellar.matching import ACCEPTED, CERTAIN, DOUBTFUL, LOG_ODDS, STRETCH
+from photogram.stellar.matching import ACCEPTED, CERTAIN, DOUBTFUL, LOG_ODDS, STRETCH, Match
 from photogram.stellar.night_result import Night
 from photogram.stellar.places import attitude_of, axis_of, roll_of, turn_between
 from photogram.stellar.sky import Site
@@ -286,14 +286,34 @@ _SCALES = tuple(1.1**k for k in range(-6, 7) if k)
 _WIDE = 0.05
 _HOUR = math.tau / 24 * 1.00273790935  # Hourly rotation of the Earth relative to the stars, radians
 
-Mend = Callable[[Exposure, "Night"], tuple[Exposure, "Night"]]
 
-
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Mistake:
+    """Possible mistake of the input, with its correction."""
+
     name: Phrase
-    mend: Mend
-    stretch: float = STRETCH
+    xy: Callable[[Floats, Floats], Floats] | None = None  # Of the images in a frame
+    angles: Callable[[float, float, float], tuple[float, float, float]] | None = (
+        None  # Azimuth, elevation, roll
+    )
+    site: Mapping[str, float] = field(default_factory=dict)
+    scale: float = 1.0  # Of the principal distance
+
+    def match(self, exposure: Exposure, night: Night) -> tuple[Match, float]:
+        """Return the match of a corrected exposure, and its principal distance."""
+        if self.xy is not None:
+            xy = np.ascontiguousarray(self.xy(exposure.xy, np.array(night.frame)))
+            exposure = replace(exposure, xy=xy)
+        if self.angles is not None:
+            angles = self.angles(*axis_of(exposure.attitude), roll_of(exposure.attitude))
+            exposure = replace(exposure, attitude=attitude_of(*angles))
+        values = night.camera.values.copy()
+        values[:2] *= self.scale
+        camera = replace(night.camera, values=values)
+        night = replace(night, camera=camera, site=replace(night.site, **self.site))
+        stretch = max(STRETCH if self.scale == 1.0 else _WIDE, night.field_error)
+        matched = identify(exposure, night, camera, tolerance=night.tolerance, stretch=stretch).match
+        return matched, float(values[0]) / matched.scale
 
 
 def find_hint(night: Night, unidentified: Sequence[int]) -> tuple[Phrase, tuple[str, ...]] | None:
@@ -306,20 +326,16 @@ def find_hint(night: Night, unidentified: Sequence[int]) -> tuple[Phrase, tuple[
     best: tuple[int, float] = (0, 0.0)
     hint = None
     for mistake in mistakes:
-        explained, odds, scales = [], 0.0, []
+        explained, odds, distances = [], 0.0, []
         for index in order:
-            exposure, mended = mistake.mend(night.exposures[index], night)
-            stretch = max(mistake.stretch, night.field_error)
-            matched = identify(
-                exposure, mended, mended.camera, tolerance=night.tolerance, stretch=stretch
-            ).match
+            matched, distance = mistake.match(night.exposures[index], night)
             if matched.expected * len(mistakes) < ACCEPTED:
                 explained.append(index)
                 odds += math.log(max(matched.expected, 1e-300))
-                scales.append(float(mended.camera.values[0]) / matched.scale)
+                distances.append(distance)
         if explained and (len(explained), -odds) > best:
             best = len(explained), -odds
-            width = 2 * math.degrees(math.atan(night.frame[0] / 2 / float(np.median(scales))))
+            width = 2 * math.degrees(math.atan(night.frame[0] / 2 / float(np.median(distances))))
             name = Phrase(mistake.name.code, {"field": width, **mistake.name.fields})
             hint = name, tuple(night.names[index] for index in unidentified if index in explained)
     return hint
@@ -332,63 +348,29 @@ def _mistakes(site: Site) -> Iterator[_Mistake]:
     later is the sky of a station farther east by the same rotation.
     """
     west, half = site.longitude_west, math.pi / 2
-    pointings: dict[str, Callable[[float, float, float], tuple[float, float, float]]] = {
-        "azimuth-from-north": lambda a, e, r: (a + math.pi, e, r),
-        "azimuth-east": lambda a, e, r: (-a, e, r),
-        "azimuth-from-north-west": lambda a, e, r: (math.pi - a, e, r),
-        "zenith-distance": lambda a, e, r: (a, half - e, r),
-    }
-    yield _Mistake(phrase("stars.hint.mirrored-x"), _flipped(0))
-    yield _Mistake(phrase("stars.hint.mirrored-y"), _flipped(1))
-    yield _Mistake(phrase("stars.hint.exchanged"), _exchanged)
-    for code, change in pointings.items():
-        yield _Mistake(phrase(f"stars.hint.{code}"), _pointed(change))
-    yield _Mistake(phrase("stars.hint.longitude-east"), _moved(longitude_west=-west))
-    yield _Mistake(phrase("stars.hint.latitude-sign"), _moved(latitude=-site.latitude))
+    yield _Mistake(phrase("stars.hint.mirrored-x"), lambda xy, frame: xy * [-1, 1] + frame * [1, 0])
+    yield _Mistake(phrase("stars.hint.mirrored-y"), lambda xy, frame: xy * [1, -1] + frame * [0, 1])
+    yield _Mistake(phrase("stars.hint.exchanged"), lambda xy, _: xy[:, ::-1])
+    north, north_west = phrase("stars.hint.azimuth-from-north"), phrase("stars.hint.azimuth-from-north-west")
+    yield _Mistake(north, angles=lambda a, e, r: (a + math.pi, e, r))
+    yield _Mistake(phrase("stars.hint.azimuth-east"), angles=lambda a, e, r: (-a, e, r))
+    yield _Mistake(north_west, angles=lambda a, e, r: (math.pi - a, e, r))
+    yield _Mistake(phrase("stars.hint.zenith-distance"), angles=lambda a, e, r: (a, half - e, r))
+    yield _Mistake(phrase("stars.hint.longitude-east"), site={"longitude_west": -west})
+    yield _Mistake(phrase("stars.hint.latitude-sign"), site={"latitude": -site.latitude})
     for scale in _SCALES:
-        yield _Mistake(phrase("stars.hint.field-of-view"), _scaled(scale), _WIDE)
+        yield _Mistake(phrase("stars.hint.field-of-view"), scale=scale)
     zone = round(-west / _HOUR)
     for hours in sorted({-1, 1, -zone, -zone - 1} - {0}):
-        later = _moved(longitude_west=west - hours * _HOUR)
-        yield _Mistake(phrase("stars.hint.utc", hours=hours), later)
+        later = {"longitude_west": west - hours * _HOUR}
+        yield _Mistake(phrase("stars.hint.utc", hours=hours), site=later)
 
 
 def _roll_mistakes() -> Iterator[_Mistake]:
-    yield _Mistake(phrase("stars.hint.roll-sign"), _pointed(lambda a, e, r: (a, e, -r)))
+    yield _Mistake(phrase("stars.hint.roll-sign"), angles=lambda a, e, r: (a, e, -r))
     for turn in (90, 180, -90):
-        mend = _pointed(lambda a, e, r, turn=turn: (a, e, r + math.radians(turn)))  # type: ignore[misc]
-        yield _Mistake(phrase("stars.hint.roll", turn=turn), mend)
+        yield _Mistake(phrase("stars.hint.roll", turn=turn), angles=partial(_rolled, turn=math.radians(turn)))
 
 
-def _flipped(axis: int) -> Mend:
-    def mend(exposure: Exposure, night: Night) -> tuple[Exposure, Night]:
-        xy = exposure.xy.copy()
-        xy[:, axis] = night.frame[axis] - xy[:, axis]
-        return replace(exposure, xy=xy), night
-
-    return mend
-
-
-def _exchanged(exposure: Exposure, night: Night) -> tuple[Exposure, Night]:
-    return replace(exposure, xy=np.ascontiguousarray(exposure.xy[:, ::-1])), night
-
-
-def _pointed(change: Callable[[float, float, float], tuple[float, float, float]]) -> Mend:
-    def mend(exposure: Exposure, night: Night) -> tuple[Exposure, Night]:
-        angles = change(*axis_of(exposure.attitude), roll_of(exposure.attitude))
-        return replace(exposure, attitude=attitude_of(*angles)), night
-
-    return mend
-
-
-def _moved(**station: Any) -> Mend:
-    return lambda exposure, night: (exposure, replace(night, site=replace(night.site, **station)))
-
-
-def _scaled(scale: float) -> Mend:
-    def mend(exposure: Exposure, night: Night) -> tuple[Exposure, Night]:
-        values = night.camera.values.copy()
-        values[:2] *= scale
-        return exposure, replace(night, camera=replace(night.camera, values=values))
-
-    return mend
+def _rolled(azimuth: float, elevation: float, roll: float, turn: float) -> tuple[float, float, float]:
+    return azimuth, elevation, roll + turn

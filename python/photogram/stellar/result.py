@@ -128,8 +128,10 @@ class Result(Judged, Documented):
     @property
     def groups(self) -> tuple[str, ...]:
         """Orientations (`pre`, `post`, `event`) with an estimated attitude."""
-        free = self.solved.free[:9].reshape(3, 3).any(axis=1)
-        return tuple(name for name, estimated in zip(GROUPS, free, strict=True) if estimated)
+        free = self.solved.free[:9]
+        return tuple(
+            name for first, name in zip((0, 3, 6), GROUPS, strict=True) if free[first : first + 3].any()
+        )
 
     def attitude(self, group: str) -> Floats:
         """Return alpha, omega, kappa (3,) of an orientation, radians."""

@@ -126,8 +126,8 @@ def camera_of_blocks(
 ) -> Camera:
     """Return a camera with parameters weighted by their covariance; those with zero variance are fixed."""
     truth_value("weighted", weighted)
-    rows = np.flatnonzero((np.diag(covariance) > 0) & weighted)
-    observed = ([names[row] for row in rows], covariance[np.ix_(rows, rows)]) if rows.size else None
+    rows = np.flatnonzero((np.diag(covariance) > 0) & weighted).tolist()
+    observed = ([names[row] for row in rows], covariance[np.ix_(rows, rows)]) if rows else None
     return Camera(model, dict(zip(names, values.tolist(), strict=True)), covariance=observed, name=name)
 
 
