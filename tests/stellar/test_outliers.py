@@ -137,7 +137,7 @@ def test_a_plate_of_one_orientation_ends_when_the_sum_stands_still(plain, solved
     assert result.converged
     # Which of the two comes first is a matter of rounding.
     assert result.solved.stop.startswith(("THE SUM OF SQUARES STANDS STILL", "NO UNKNOWN CHANGES BY MORE"))
-    levels = [level.level for level in result.levels]
+    levels = list(result.levels)
     assert min(levels) == pytest.approx(levels[-1], rel=1e-8)
 
 

@@ -72,7 +72,7 @@ def test_refraction_comes_back_with_the_camera_free(low):
         result = calibrate(made)
         assert result.converged
         once = calibrate(replace(made, options=replace(made.options, as_published=True)))
-        assert [level.solution for level in once.levels].count("refraction") == 2
+        assert [len(stage.levels) for stage in once.stages if stage.solution == "refraction"] == [2]
         for found, list_ in ((result, strict), (once, published)):
             list_.append((found.parameters["tau1"] - true) / found.mean_errors["tau1"])
     assert 4.0 < result.mean_errors["tau1"] < 5.0

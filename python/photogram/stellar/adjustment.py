@@ -19,7 +19,7 @@ from photogram.stellar.options import core_threads
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES
 from photogram.stellar.problem import Problem
 from photogram.stellar.result import Result
-from photogram.stellar.state import PreRun, Solved, Stage
+from photogram.stellar.state import PreRun, Solved
 from photogram.words import Phrase, phrase
 
 
@@ -64,22 +64,21 @@ def calibrate(
     run: Callable[..., Solved] = iterate_as_published
     if not options.as_published:
         run = partial(iterate, threads=threads, progress=progress)
-    stages: tuple[Stage, ...] = ()
+    stages: tuple[Solved, ...] = ()
     if options.minimum_stars:
         smallest, limit = _minimum_problem(problem), options.max_iterations_minimum
         estimated = np.zeros(len(initial), bool)
         estimated[6:14] = ~problem.fixed[6:14]
         estimated[INDEX["cy"]] &= not options.common_scale
         solved = run(smallest, initial, estimated, solution="minimum", limit=limit)
-        stages = (Stage.of(smallest, solved),)
+        stages = (solved,)
         initial = solved.parameters.copy()
         initial[0:3] = initial[3:6] = initial[6:9]
         if options.pre_run:
             # The minimum solution estimates neither distortion nor refraction: their curves would be zero.
             without = replace(smallest, options=replace(smallest.options, curves=False, refraction=False))
             residuals = _pre_run(problem, smallest, initial)
-            counts = stages[-1].counts
-            return _remarked(Result(without, solved, counts, (), problem, stages, residuals), [])
+            return _remarked(Result(without, solved, (), problem, stages, residuals), [])
     free = free_parameters(problem)
     _check_groups(problem)
     limit = options.max_iterations
@@ -88,10 +87,10 @@ def calibrate(
         solved, remarks = _from_far(problem, initial, free)
     else:
         solved = run(problem, initial, free, solution="maximum", limit=limit)
-    stages = (*stages, Stage.of(problem, solved))
+    stages = (*stages, solved)
     if options.refraction and solved.converged:
         solved = _refraction(problem, run, solved)
-        stages = (*stages, Stage.of(problem, solved))
+        stages = (*stages, solved)
     elif options.refraction:
         remarks = [phrase("stars.no-refraction-solution")]
 
@@ -100,12 +99,12 @@ def calibrate(
         return _refraction(left, run, found) if options.refraction and found.converged else found
 
     def solution(left: Problem) -> Result:
-        stage = Stage.of(left, found := solve(left))
-        return Result(left, found, stage.counts, (), left, (stage,))
+        found = solve(left)
+        return Result(left, found, (), left, (found,))
 
     if not solved.converged:
         remarks += culprits(problem, solved, solve)
-    result = Result(problem, solved, stages[-1].counts, (), problem, stages)
+    result = Result(problem, solved, (), problem, stages)
     if result.converged:
         result = replace(result, spoiled=harm(result, solution) or "")
     result = _remarked(result, remarks)

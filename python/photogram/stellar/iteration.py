@@ -19,7 +19,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.stellar.problem import Problem, degrees_of_freedom, failure, singular
-from photogram.stellar.state import Level, Solved
+from photogram.stellar.state import Solved
 from photogram.words import phrase
 
 _EXPECTED = 1e-6  # Initial mean error of a direction, radians
@@ -86,7 +86,8 @@ def iterate(
         log_determinant=last.get("log_determinant", math.nan),
         stop=_STOPS.get(status["status"], f"{len(run.levels) - 1} ITERATIONS COMPLETED"),
         converged=status["status"] in ("converged", "still"),
-        levels=tuple(Level(solution, i + 1, level) for i, level in enumerate(run.levels)),
+        levels=tuple(run.levels),
+        solution=solution,
     )
 
 
@@ -251,7 +252,8 @@ def iterate_as_published(
         log_determinant=correction["log_determinant"],
         stop=stop,
         converged=stop == SETTLED or once,
-        levels=tuple(Level(solution, i + 1, level) for i, level in enumerate(levels)),
+        levels=tuple(levels),
+        solution=solution,
     )
 
 

@@ -181,10 +181,10 @@ def combine(result: Result, pairs: tuple[tuple[str, str], ...], *, threads: int 
     As published, this is one linear step; otherwise it is iterated with one attitude for the groups. The
     degrees of freedom of the result include the constraints.
     """
-    counts = replace(result.counts, constraints=len(constraints(pairs, len(NAMES))))
+    counts = replace(result.solved.counts, constraints=len(constraints(pairs, len(NAMES))))
     published = result.problem.options.as_published
     solved = _modified(result, pairs) if published else _iterated(result, pairs, threads)
-    return replace(result, solved=solved, counts=counts, pairs=pairs, movement=(), messages=())
+    return replace(result, solved=replace(solved, counts=counts), pairs=pairs, movement=(), messages=())
 
 
 def _modified(result: Result, pairs: tuple[tuple[str, str], ...]) -> Solved:
@@ -205,6 +205,7 @@ def _modified(result: Result, pairs: tuple[tuple[str, str], ...]) -> Solved:
         stop=solved.stop,
         converged=solved.converged,
         levels=solved.levels,
+        solution=solved.solution,
     )
 
 

@@ -19,7 +19,7 @@ from photogram.stellar.sky import Site
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
-    from photogram.stellar.state import Stage
+    from photogram.stellar.state import Solved
 
 WIDTH = 132
 
@@ -159,7 +159,7 @@ def _columns(*cells: str) -> str:
     return "".join(f"{cell:<26}" for cell in cells)
 
 
-def _stage(stage: Stage) -> Iterator[str]:
+def _stage(stage: Solved) -> Iterator[str]:
     counts = stage.counts
     yield ""
     yield f"{stage.solution.upper()} SOLUTION"
@@ -173,7 +173,7 @@ def _stage(stage: Stage) -> Iterator[str]:
     yield from (_columns(name, *map(str, numbers)) for name, numbers in rows.items())
     yield f"DEGREES OF FREEDOM {counts.degrees_of_freedom}"
     yield "LEVEL OF DISCREPANCIES"
-    yield from (exponential(level.level) for level in stage.levels)
+    yield from map(exponential, stage.levels)
     yield stage.stop
 
 

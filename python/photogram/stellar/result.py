@@ -21,7 +21,7 @@ from photogram.stellar.directions import Directions, directions, mean_error_elli
 from photogram.stellar.parameters import DISTORTION, GROUPS, INDEX, NAMES, SIGNIFICANT
 from photogram.stellar.places import transformed_angles
 from photogram.stellar.problem import Counts, Problem
-from photogram.stellar.state import Level, PreRun, Solved, Stage
+from photogram.stellar.state import PreRun, Solved
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -44,8 +44,6 @@ class Result(Judged, Documented):
         Input of the adjustment.
     solved
         Adjusted parameters, star positions, cofactors, residuals.
-    counts
-        Observations and unknowns.
     messages
         Warnings.
     given
@@ -66,10 +64,9 @@ class Result(Judged, Documented):
 
     problem: Problem
     solved: Solved
-    counts: Counts
     messages: tuple[Message, ...]
     given: Problem
-    stages: tuple[Stage, ...] = ()
+    stages: tuple[Solved, ...] = ()
     pre_run: PreRun | None = None
     movement: tuple[Movement, ...] = ()
     combined: Result | None = None
@@ -82,8 +79,13 @@ class Result(Judged, Documented):
         return self.solved.converged
 
     @property
-    def levels(self) -> tuple[Level, ...]:
-        """Iteration history of all solutions."""
+    def counts(self) -> Counts:
+        """Observations and unknowns."""
+        return self.solved.counts
+
+    @property
+    def levels(self) -> tuple[float, ...]:
+        """Levels of discrepancies of all solutions, metres."""
         return tuple(level for stage in self.stages for level in stage.levels)
 
     @property

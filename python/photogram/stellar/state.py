@@ -1,4 +1,4 @@
-"""Current values of an iteration, and its history."""
+"""Solution of an iteration, with its history."""
 
 from __future__ import annotations
 
@@ -13,22 +13,12 @@ from photogram.stellar.problem import Counts, Problem, degrees_of_freedom
 from photogram.words import Phrase
 
 
-@dataclass(frozen=True)
-class Level:
-    """Pass of an iteration."""
-
-    solution: str  # `minimum`, `maximum` or `refraction`
-    number: int  # Number, from 1
-    # Level of discrepancies before its correction, metres. As published: root of the plate sum of squares
-    # over the degrees of freedom, with stars at their catalogue positions. Otherwise: root of the total
-    # weighted sum of squares over the degrees of freedom.
-    level: float
-
-
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Result of an iteration."""
+    """Solution of a run."""
 
+    solution: str  # `minimum`, `maximum`, `refraction` or `combined`
+    counts: Counts
     parameters: Floats  # (26,) values
     places: Floats  # (S, 2) adjusted star positions
     free: Bools  # (26,) whether parameters were estimated
@@ -47,11 +37,16 @@ class Solved:
     )
     stop: str  # Reason of the end of the iteration
     converged: bool  # Whether its convergence criterion was met
-    levels: tuple[Level, ...]
+    # Levels of discrepancies before the corrections of each pass, metres. As published: root of the plate sum
+    # of squares over the degrees of freedom, with stars at their catalogue positions. Otherwise: root of the
+    # total weighted sum of squares over the degrees of freedom.
+    levels: tuple[float, ...]
     remarks: tuple[Phrase, ...] = ()
 
     @classmethod
-    def of(cls, problem: Problem, found: dict[str, Any], *, unit: float = 1.0, **others: Any) -> Solved:
+    def of(
+        cls, problem: Problem, found: dict[str, Any], *, free: Bools, unit: float = 1.0, **others: Any
+    ) -> Solved:
         """Return a result from the core values of stars and images, and other attributes.
 
         `unit` is the mean error of unit weight in the standardized residuals of the core.
@@ -61,6 +56,8 @@ class Solved:
         axis_residual = found["axis_residual"]
         # The residuals of the core are observed minus computed.
         return cls(
+            counts=degrees_of_freedom(problem, free),
+            free=free,
             places=found["places"],
             star_cofactors=found["place_cofactors"],
             star_inverse=found["place_inverses"],
@@ -73,24 +70,6 @@ class Solved:
             sums=(plate, stars, weighted + axis),
             **others,
         )
-
-
-@dataclass(frozen=True)
-class Stage:
-    """Solution of a run."""
-
-    solution: str  # `minimum`, `maximum` or `refraction`
-    counts: Counts
-    levels: tuple[Level, ...]
-    stop: str
-    converged: bool
-    log_determinant: float
-
-    @classmethod
-    def of(cls, problem: Problem, solved: Solved) -> Stage:
-        """Return the stage of a solution."""
-        levels, counts = solved.levels, degrees_of_freedom(problem, solved.free)
-        return cls(levels[0].solution, counts, levels, solved.stop, solved.converged, solved.log_determinant)
 
     @property
     def iterations(self) -> int:

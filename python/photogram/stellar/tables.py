@@ -100,10 +100,15 @@ def stages(result: Result) -> list[Table]:
         )
         for name, attribute in attributes.items()
     ]
+    counts_of_levels = [len(stage.levels) for stage in result.stages]
     levels = [
-        of_each(result.levels, "solution", kind="name", head="Solution"),
-        of_each(result.levels, "number", head="Iteration"),
-        of_each(result.levels, "level", head="Level of discrepancies", figures=9),
+        names_column(
+            np.repeat([stage.solution for stage in result.stages], counts_of_levels), "Solution", "solution"
+        ),
+        Quantity(
+            [k + 1 for count in counts_of_levels for k in range(count)], member="number", head="Iteration"
+        ),
+        Quantity(result.levels, member="level", head="Level of discrepancies", figures=9),
     ]
     note = "The determinant is of the reduced normal equations, in the units of the parameters."
     return [Table("solutions", "Solutions", columns, note), Table("iterations", "Iterations", levels)]
