@@ -13,7 +13,7 @@ from photogram.arguments.fields import array, check_arrays, check_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.io.angles import ARCSEC
 from photogram.io.delimited import read_records, renaming
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.words import phrase
 
 _MAS = 1e-3 * ARCSEC
@@ -146,15 +146,11 @@ class Catalogue:
 
     def take(self, chosen: Indices) -> Catalogue:
         """Return a subset of the stars, by index."""
-        return Catalogue(
-            ids=tuple(map(self.ids.__getitem__, chosen.tolist())),
-            places=self.places[chosen],
-            proper_motions=self.proper_motions[chosen],
-            parallaxes=self.parallaxes[chosen],
-            magnitudes=self.magnitudes[chosen],
-            epoch=self.epoch,
-            errors=None if self.errors is None else self.errors[chosen],
-        )
+        ids = tuple(map(self.ids.__getitem__, chosen.tolist()))
+        names = ("places", "proper_motions", "parallaxes", "magnitudes")
+        columns = {name: getattr(self, name)[chosen] for name in names}
+        errors = None if self.errors is None else self.errors[chosen]
+        return replace(self, ids=ids, errors=errors, **columns)
 
 
 def star_key(name: str) -> str:

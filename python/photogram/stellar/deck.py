@@ -90,15 +90,18 @@ _DEGREE = np.pi / 180.0
 _HOUR = np.pi / 12.0
 _FULL = 52  # Cards of a full weight matrix of 22 parameters: every row starts a card
 _MAX_STARS, _MAX_POINTS, _FIRST_POINT = 100, 200, 10000
-_HEAD = (
-    "card 1 (problem number)",
-    "card 2 (title)",
-    "card 3 (options)",
-    "card 4 (problem constants)",
-    "card 5 (event)",
-    "card 6 (plate)",
-    "card 7 (comparator)",
-)
+_HEAD: dict[str, dict[str, tuple[int, int]]] = {
+    "card 1 (problem number)": {"problem": (1, 4), "date of computation": (7, 25)},
+    "card 2 (title)": {"title": (1, 80)},
+    "card 3 (options)": {},
+    "card 4 (problem constants)": {},
+    "card 5 (event)": {"event": (1, 4), "date of observation": (7, 25)},
+    "card 6 (plate)": {"plate": (1, 4), "camera": (7, 14), "tracking unit": (17, 19)},
+    "card 7 (comparator)": {"comparator": (1, 8), "operator": (9, 32)},
+}
+"""First cards, with the columns of their labels."""
+_SWITCHES = {"common_scale": 1, "refraction": 5, "pre_run": 7, "curves": 8, "plate_list": 11}
+"""Options that are on or off, with their numbers."""
 
 
 def read_deck(path: Path) -> list[Problem]:
@@ -126,7 +129,8 @@ def read_deck(path: Path) -> list[Problem]:
 
 
 def _problem(cards: Cards) -> tuple[Problem, bool]:
-    first, title, option_card, constants, event, plate, comparator = map(cards.take, _HEAD)
+    head = [*map(cards.take, _HEAD)]
+    first, _, option_card, constants, _, plate, comparator = head
     option, mean_error = _descriptors(option_card)
     reject, histogram = (option_card.name(*columns) not in ("", "0") for columns in ((77, 77), (78, 80)))
     values = constants.reals(1, 10, 8, 6)
@@ -161,14 +165,10 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
                 raise card.error(Phrase(code, {"names": [number]}))
     with at_place(option_card):
         options = Options(
-            common_scale=bool(option[1]),
-            refraction=bool(option[5]),
+            **{name: bool(option[number]) for name, number in _SWITCHES.items()},
             minimum_stars=tuple(minimum),
-            pre_run=bool(option[7]),
-            curves=bool(option[8]),
             reference=reference,
             pole=pole,
-            plate_list=bool(option[11]),
             max_iterations_minimum=option[12],
             max_iterations=option[13],
             mean_error=mean_error,
@@ -183,20 +183,13 @@ def _problem(cards: Cards) -> tuple[Problem, bool]:
             movement_time=time,
         )
     labels = {
-        "title": title.name(1, 80),
-        "problem": first.name(1, 4),
-        "date of computation": first.name(7, 25),
-        "event": event.name(1, 4),
-        "date of observation": event.name(7, 25),
-        "plate": plate.name(1, 4),
-        "camera": plate.name(7, 14),
-        "tracking unit": plate.name(17, 19),
-        "comparator": comparator.name(1, 8),
-        "operator": comparator.name(9, 32),
-        "time corrections pre, post, event": ", ".join(f"{c / _HOUR * 3600:.4f} s" for c in corrections)
-        if any(corrections)
-        else "",
+        name: card.name(*columns)
+        for card, fields in zip(head, _HEAD.values(), strict=True)
+        for name, columns in fields.items()
     }
+    if any(corrections):
+        seconds = ", ".join(f"{correction / _HOUR * 3600:.4f} s" for correction in corrections)
+        labels["time corrections pre, post, event"] = seconds
     problem = Problem(
         site=site,
         star_ids=ids,

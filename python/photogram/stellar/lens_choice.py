@@ -19,6 +19,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
+from photogram.statistics.agreement import quadratic
 from photogram.stellar.sky_cameras import SkyCamera
 from photogram.words import Phrase
 
@@ -73,9 +74,7 @@ class LensFit:
 
 def _fisher(change: Floats, covariance: Floats, freedom: int) -> tuple[float, float]:
     """Return F of parameters with covariance (scaled by m^2), and its probability."""
-    scale = np.sqrt(np.diag(covariance))
-    scaled = change / scale
-    found = float(scaled @ np.linalg.solve(covariance / np.outer(scale, scale), scaled)) / len(change)
+    found = quadratic(change, covariance)[0] / len(change)
     return found, _photocore.fisher(found, float(len(change)), float(freedom))
 
 

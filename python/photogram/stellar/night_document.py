@@ -120,12 +120,12 @@ def _standstill(result: CalibratedNight) -> dict[str, Any] | None:
 
 def _highlights(result: CalibratedNight) -> list[Fact]:
     found, test = result.calibration, result.test
-    rms = float(np.sqrt(np.mean(found.residuals**2)))
+    rms = np.sqrt(np.mean(found.residuals**2, axis=0))
     expected = test and f"{test.limits[0]:.3f} to {test.limits[1]:.3f} expected of its square"
     of = f"of {len(result.night.exposures)}; {len(found.xy)} images of {len(found.catalogue)} stars"
     return [
         Fact.of("Mean error of unit weight", found.mean_error, note=expected or "", decimals=3),
-        Fact.of("rms of image residuals", rms, "px", figures=3),
+        Fact.of("rms of image residuals in x and y", rms, "px", figures=3),
         Fact.of("Exposures", len(result.exposures), note=of),
         Fact.of(
             "Any exposure falsely identified",
@@ -345,7 +345,6 @@ def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:
     found, night = result.calibration, result.night
     estimated = int(np.isfinite(found.star_residuals[:, 0]).sum())
     measured = sum(len(exposure.xy) for exposure in result.exposures)
-    rms = np.sqrt(np.mean(found.residuals**2, axis=0))
     tested = about("global-test.none")
     if (test := result.test) is not None:
         verdict, (low, high) = "fails" if test.rejected_high or test.rejected_low else "holds", test.limits
@@ -353,7 +352,6 @@ def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:
     lens = result.camera.lens + (" (fx = fy)" if result.camera.common_scale else "")
     much = [
         Fact("Status", f"{found.status}, {found.iterations} iterations"),
-        Fact("Exposures, of those given", f"{len(result.exposures)} of {len(night.exposures)}"),
         Fact("Images measured, identified, used", f"{measured}, {result.identified.sum()}, {len(found.xy)}"),
         Fact.of("Stars", len(found.catalogue), note=f"{estimated} of them estimated"),
         Fact.of("Degrees of freedom", found.degrees_of_freedom),
@@ -362,16 +360,8 @@ def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:
         Fact("Effects left out of places", ", ".join(night.site.effects.left_out) or "none"),
     ]
     good = [
-        Fact.of("Mean error of unit weight", found.mean_error, decimals=4),
         Fact("Global test", tested),
         Fact.of("Mean error of an image coordinate", found.mean_error * night.pixel_sd, "px", decimals=4),
-        Fact.of("rms of residuals in x and y", rms, "px", decimals=4),
-        Fact.of(
-            "Any exposure falsely identified",
-            result.falsely_identified,
-            note="probability, at most",
-            figures=2,
-        ),
         Fact.of("UT1 - UTC", night.earth.dut1, "s", decimals=4),
         Fact.of("Pole x, y", np.divide(night.earth.pole, ARCSEC), "arcsec", decimals=4),
     ]
