@@ -32,13 +32,14 @@ def test_every_exposure_and_every_star_has_its_probability(result):
     assert document["images"][3]["probability"] == result.star_probabilities[3]
     first = document["exposures"][0]
     assert (first["probability"], first["log_odds"]) == (result.probabilities[0], result.log_odds[0])
-    assert first["icrs"]["quaternion"] == result.inertial[0].quaternion.tolist()
+    quaternions = result.inertial.values("quaternion_to_vision")
+    assert first["icrs"]["quaternion"] == quaternions[0].tolist()
     text = result.report().split("Identification and fit\n")[1]
     assert f"{result.log_odds[0]:.1f}" in text
     table = result.document().table("exposures").frame()
     assert table["by_chance"].tolist() == result.odds.tolist()
-    assert table[["qw", "qx", "qy", "qz"]].iloc[2].tolist() == result.inertial[2].quaternion.tolist()
-    assert table["cov_xy"][1] == result.inertial[1].covariance[0, 1]
+    assert table[["qw", "qx", "qy", "qz"]].iloc[2].tolist() == quaternions[2].tolist()
+    assert table["cov_xy"][1] == -result.inertial.step_covariances[1, 0, 1]
     images = result.document().table("images").frame()
     assert images["probability"].tolist() == result.star_probabilities.tolist()
     assert images["residual_x_px"].tolist() == result.calibration.residuals[:, 0].tolist()

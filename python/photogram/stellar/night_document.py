@@ -29,7 +29,7 @@ from photogram.stellar.findings import night_tests
 from photogram.stellar.lens_choice import DECISIVE, POSITIVE, LensTest
 from photogram.stellar.matching import ACCEPTED, LOG_ODDS
 from photogram.stellar.pictures import night_drawings
-from photogram.stellar.places import axis_of
+from photogram.stellar.places import VISION, axis_of
 
 if TYPE_CHECKING:
     from photogram.stellar import CalibratedNight, Night
@@ -233,20 +233,20 @@ def _attitudes(result: CalibratedNight) -> list[Quantity]:
 
 def _inertial(result: CalibratedNight) -> list[Quantity]:
     found = result.inertial
-    ra, dec = np.degrees([each.axis for each in found]).T
-    covariances = np.array([each.covariance for each in found])
+    assert found.step_covariances is not None
+    x, y, z = found.values("matrix_to_vision")[:, 2].T
+    ra, dec = np.degrees([np.arctan2(y, x) % (2 * np.pi), np.arctan2(z, np.hypot(x, y))])
+    covariances = VISION * found.step_covariances
     upper = tuple(Axis(f"{a}{b}") for k, a in enumerate("xyz") for b in "xyz"[k:])
-    members = [
-        {
-            "quaternion": each.quaternion,
-            "quaternion_covariance": each.quaternion_covariance,
-            "covariance": each.covariance,
-            "right_ascension_deg": right_ascension,
-            "declination_deg": declination,
-        }
-        for each, right_ascension, declination in zip(found, ra.tolist(), dec.tolist(), strict=True)
-    ]
-    quaternions = [each.quaternion for each in found]
+    quaternions = found.values("quaternion_to_vision")
+    members = {
+        "quaternion": quaternions,
+        "quaternion_covariance": found.covariances("quaternion_to_vision"),
+        "covariance": covariances,
+        "right_ascension_deg": ra.tolist(),
+        "declination_deg": dec.tolist(),
+    }
+    rows = [dict(zip(members, row, strict=True)) for row in zip(*members.values(), strict=True)]
     errors = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     return [
         _exposure(result),
@@ -255,7 +255,7 @@ def _inertial(result: CalibratedNight) -> list[Quantity]:
         column(quaternions, None, "{}", 9, parts="qw, qx, qy, qz", name=""),
         column(errors, ARCSEC_OF_RAD, "sd {}", 2, parts="about x, about y, about z"),
         Quantity(covariances[:, *np.triu_indices(3)], upper, name="cov"),
-        Quantity(members, member="icrs"),
+        Quantity(rows, member="icrs"),
     ]
 
 

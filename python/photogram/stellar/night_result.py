@@ -14,12 +14,13 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message, unknown_name
+from photogram.network.attitudes import Attitudes
 from photogram.show.methods import Documented, Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.camera_tables import correlated, significance
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.matching import STRETCH
-from photogram.stellar.places import Earth, InertialAttitude, inertial_attitude
+from photogram.stellar.places import Earth, inertial_attitudes
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration
 from photogram.stellar.sky_cameras import SkyCamera, lens_named
@@ -216,14 +217,11 @@ class CalibratedNight(Judged, Documented):
         return float(np.nansum(self.odds))
 
     @cached_property
-    def inertial(self) -> list[InertialAttitude]:
-        """(E,) attitudes in ICRS: quaternions with covariance."""
+    def inertial(self) -> Attitudes:
+        """Attitudes of the E exposures in ICRS, with covariances of rotations."""
         found, night = self.calibration, self.night
-        rows = zip(found.attitudes, found.attitude_covariances, self.exposures, strict=True)
-        return [
-            inertial_attitude(angles, covariance, night.site, exposure.utc, night.earth)
-            for angles, covariance, exposure in rows
-        ]
+        utcs = [exposure.utc for exposure in self.exposures]
+        return inertial_attitudes(found.attitudes, found.attitude_covariances, night.site, utcs, night.earth)
 
     @property
     def mostly_left_out(self) -> bool:

@@ -198,43 +198,17 @@ def _no_motion(catalogue: Catalogue) -> InputError:
     return InputError(phrase("stars.no-motion", star=catalogue.ids[int(np.argmax(size))]))
 
 
-@dataclass(frozen=True, eq=False)
-class InertialAttitude:
-    """Attitude of an exposure in ICRS.
-
-    Camera axes are x right, y down, z along the axis, as in computer vision.
-    """
-
-    # (3, 3) R with camera direction = R times ICRS direction, without aberration and refraction; det R = 1
-    matrix: Floats
-    covariance: Floats  # (3, 3) of the small rotation d about camera axes, R_true = Exp(d) R, radians^2
-
-    @property
-    def quaternion(self) -> Floats:
-        """(4,) Hamilton quaternion w, x, y, z with w >= 0; camera = q icrs q*."""
-        return np.asarray(Attitudes(self.matrix[None]).values("quaternion")[0], float)
-
-    @property
-    def quaternion_covariance(self) -> Floats:
-        """(4, 4) covariance of the quaternion, of rank 3 since its length is 1."""
-        w, x, y, z = self.quaternion
-        # (0, d / 2) times q.
-        partials = 0.5 * np.array([[-x, -y, -z], [w, z, -y], [-z, w, x], [y, -x, w]])
-        return np.asarray(partials @ self.covariance @ partials.T, float)
-
-    @property
-    def axis(self) -> tuple[float, float]:
-        """Right ascension (0 to 2 pi) and declination of the camera's axis, radians."""
-        x, y, z = self.matrix[2]
-        return float(np.arctan2(y, x) % (2 * np.pi)), float(np.arctan2(z, np.hypot(x, y)))
+VISION = np.outer([1.0, -1.0, -1.0], [1.0, -1.0, -1.0])
+"""Signs of covariances of rotations about vision axes (x right, y down) in terms of photo axes."""
 
 
-def inertial_attitude(
-    angles: Floats, covariance: Floats, site: Site, utc: str, earth: Earth | None = None
-) -> InertialAttitude:
-    """Return an attitude in ICRS from alpha, omega, kappa with covariance (3, 3).
+def inertial_attitudes(
+    angles: Floats, covariances: Floats, site: Site, utcs: Sequence[str], earth: Earth | None = None
+) -> Attitudes:
+    """Return attitudes in ICRS from alpha, omega, kappa (E, 3) with covariances (E, 3, 3).
 
-    Angles and station refer to the mean pole; without `earth` UT1 - UTC and the pole are zero.
+    Angles and station refer to the mean pole; without `earth` UT1 - UTC and the pole are zero. Aberration and
+    refraction are ignored.
 
     Notes
     -----
@@ -243,17 +217,16 @@ def inertial_attitude(
     precession and nutation (IAU 2006/2000A) rotates to ICRS.
     """
     earth = earth or Earth()
-    matrix = _photocore.pointing_matrix(np.asarray(angles, float))
-    local = _local_axes(matrix)
     place = earth.site_of_date(site)
-    seen = matrix.T
-    if earth.pole != (0.0, 0.0):
-        seen = terrestrial(place).T @ pole_matrix(earth.pole).T @ terrestrial(site) @ seen
-    equatorial = equatorial_axes(place.latitude, sidereal_time(place, utc, earth.dut1))
-    turned = to_date(utc).T @ equatorial @ seen
-    # The small rotation of the pole is not exactly orthogonal.
-    left, _, right = np.linalg.svd(turned.T)
-    return InertialAttitude(np.asarray(left @ right, float), np.asarray(local @ covariance @ local.T, float))
+    to_date_pole = terrestrial(place).T @ pole_matrix(earth.pole).T @ terrestrial(site)
+    matrices, steps = [], []
+    for own, covariance, utc in zip(angles, covariances, utcs, strict=True):
+        matrix = _photocore.pointing_matrix(np.asarray(own, float))
+        equatorial = equatorial_axes(place.latitude, sidereal_time(place, utc, earth.dut1))
+        matrices.append(matrix @ to_date_pole.T @ equatorial.T @ to_date(utc))
+        local = _local_axes(matrix)
+        steps.append(VISION * (local @ covariance @ local.T))
+    return Attitudes.of("matrix_to_vision", np.array(matrices), np.array(steps))
 
 
 def station_attitude(matrix: Floats, site: Site, utc: str, earth: Earth | None = None) -> Floats:
