@@ -23,6 +23,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
+from photogram.statistics.fits import Fit
 from photogram.stellar.matching import binomial_tail
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration, partials
 
@@ -94,11 +95,8 @@ def _covariance(found: SkyCalibration, known: Indices) -> Floats:
 def _about_mean(angles: Floats, covariance: Floats, chosen: list[int]) -> float:
     """Return the weighted sum of squares of some attitudes about their mean."""
     places = (3 * np.array(chosen)[:, None] + np.arange(3)).ravel()
-    weight = np.linalg.inv(covariance[np.ix_(places, places)])
-    design, values = np.tile(np.eye(3), (len(chosen), 1)), angles[chosen].ravel()
-    mean = np.linalg.solve(design.T @ weight @ design, design.T @ weight @ values)
-    off = values - design @ mean
-    return float(off @ weight @ off)
+    design = np.tile(np.eye(3), (len(chosen), 1))
+    return Fit.of(angles[chosen].ravel(), covariance[np.ix_(places, places)], design).omega
 
 
 NOTABLE = 2.0  # A smaller ratio to the prediction indicates only a less sharp exposure

@@ -8,6 +8,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
+from photogram.show.sketch.marks import ellipse_axes
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
@@ -20,9 +21,8 @@ def mean_error_ellipses(covariances: Floats, declinations: Floats) -> Floats:
     increasing right ascension towards increasing declination.
     """
     scale = np.column_stack([np.cos(declinations), np.ones(len(declinations))])
-    values, vectors = np.linalg.eigh(covariances * scale[:, :, None] * scale[:, None])
-    minor, major = np.sqrt(np.maximum(values, 0.0)).T
-    return np.column_stack([major, minor, np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1]) % np.pi])
+    semi_axes, angles = ellipse_axes(covariances * scale[:, :, None] * scale[:, None])
+    return np.column_stack([semi_axes, np.radians(angles) % np.pi])
 
 
 @dataclass(frozen=True, eq=False)
