@@ -56,20 +56,21 @@ def stellar_camera(
         if as_published:
             problem = replace(problem, options=replace(problem.options, as_published=True))
         result = calibrate(problem)
-        results.append(result)
+        document = result.document()
+        results.append((result, document))
         mark = f"-{number}" if len(problems) > 1 else ""
         cameras = {f"camera{mark}.json": camera_document(result)}
         files |= documents.inside(_files(result, mark))
         withheld = phrase("command.camera-withheld", names=list(cameras))
         files |= documents.unless_withheld(cameras, withheld, usable=result.verdict.usable)
-        files |= documents.pictures(result.document().plots, mark)
+        files |= documents.pictures(document.plots, mark)
         files |= documents.page(job, result.document, mark)
         asked |= documents.as_json(result, mark)
-    code = worst((result.verdict for result in results), strict=strict)
+    code = worst((result.verdict for result, _ in results), strict=strict)
 
     def summarize() -> None:
-        for result in results:
-            print_document(result.document(), "the report", remarks=result.messages)
+        for result, document in results:
+            print_document(document, "the report", remarks=result.messages)
 
     job.finish(files, asked, summary=summarize, code=code)
 
