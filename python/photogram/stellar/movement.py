@@ -152,15 +152,13 @@ def _differences(a: Floats, b: Floats, local_a: Floats, local_b: Floats) -> tupl
     )
 
 
-def constraints(pairs: tuple[tuple[str, str], ...], parameters: int) -> Floats:
-    """Return C: three rows for one pair, six for more (pre - event, post - event)."""
-    pairs = pairs if len(pairs) == 1 else (("pre", "event"), ("post", "event"))
-    rows = np.zeros((3 * len(pairs), parameters))
-    for p, (first, second) in enumerate(pairs):
-        for k in range(3):
-            rows[3 * p + k, 3 * GROUPS.index(first) + k] = 1.0
-            rows[3 * p + k, 3 * GROUPS.index(second) + k] = -1.0
-    return rows
+def common_attitudes(pairs: tuple[tuple[str, str], ...]) -> tuple[Floats, list[int]]:
+    """Return S with p = S p for parameters p with equal attitudes of pairs, and the rows that S replaces."""
+    *others, last = sorted({GROUPS.index(name) for pair in pairs for name in pair})
+    spread = np.eye(len(NAMES))
+    rows = [3 * group + k for group in others for k in range(3)]
+    spread[rows] = np.tile(spread[3 * last : 3 * last + 3], (len(others), 1))
+    return spread, rows
 
 
 def modify(cofactors: Floats, right: Floats, c: Floats, misclosure: Floats) -> tuple[Floats, Floats]:
@@ -181,16 +179,18 @@ def combine(result: Result, pairs: tuple[tuple[str, str], ...], *, threads: int 
     As published, this is one linear step; otherwise it is iterated with one attitude for the groups. The
     degrees of freedom of the result include the constraints.
     """
-    counts = replace(result.solved.counts, constraints=len(constraints(pairs, len(NAMES))))
-    published = result.problem.options.as_published
-    solved = _modified(result, pairs) if published else _iterated(result, pairs, threads)
+    spread, rows = common_attitudes(pairs)
+    counts = replace(result.solved.counts, constraints=len(rows))
+    if result.problem.options.as_published:
+        solved = _modified(result, np.eye(len(spread))[rows] - spread[rows])
+    else:
+        solved = _iterated(result, spread, threads)
     return replace(result, solved=replace(solved, counts=counts), pairs=pairs, movement=(), messages=())
 
 
-def _modified(result: Result, pairs: tuple[tuple[str, str], ...]) -> Solved:
-    """Correct once (equations 104 and 105), and compute residuals."""
+def _modified(result: Result, c: Floats) -> Solved:
+    """Correct once under C p = 0 (equations 104 and 105), and compute residuals."""
     solved, problem = result.solved, result.problem
-    c = constraints(pairs, len(solved.parameters))
     # Whole rotations between two kappas are not movements.
     off = c @ solved.parameters
     misclosure = -(np.remainder(off + np.pi, 2 * np.pi) - np.pi)
@@ -209,16 +209,10 @@ def _modified(result: Result, pairs: tuple[tuple[str, str], ...]) -> Solved:
     )
 
 
-def _iterated(result: Result, pairs: tuple[tuple[str, str], ...], threads: int | None) -> Solved:
-    """Adjust again with one attitude for all groups of the pairs."""
+def _iterated(result: Result, spread: Floats, threads: int | None) -> Solved:
+    """Adjust again with common attitudes."""
     solved, problem = result.solved, result.problem
-    together = sorted({GROUPS.index(name) for pair in pairs for name in pair})
-    last = together[-1]
-    groups = np.array([last if group in together else group for group in range(3)])
-    # All parameters from the remaining ones.
-    spread = np.eye(len(NAMES))
-    for group in together[:-1]:
-        spread[3 * group : 3 * group + 3] = spread[3 * last : 3 * last + 3]
+    groups = spread[:9:3, :9:3].argmax(axis=1)
     weights, initial = _common_weights(problem, spread, solved.parameters)
     merged = replace(
         problem,

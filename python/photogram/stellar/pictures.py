@@ -106,7 +106,7 @@ def night_pictured(result: CalibratedNight) -> PicturedStars:
     known = np.flatnonzero(np.diag(camera.covariance) > 0)
     names = [camera.names[row] for row in known]
     correlated = [Correlated(camera.name, names, camera.correlations[np.ix_(known, known)])]
-    curve = lens_curve(camera, found.xy)
+    curve = lens_curve(camera, found.xy) if result.camera.facts.groups else None
     marks = [result.verdict.marks(each.kind, each.values.shape) for each in tested]
     distortion = [] if curve is None else [curves_of(camera, curve)]
     return PicturedStars(images, tested, marks, correlated, distortion, found.mean_error)
