@@ -33,12 +33,10 @@ def pixels(dense, change):
     return {"images": {"shift": change(dense.block.image_xy - dense.survey.cameras[0, 1:3])}}
 
 
-def read(dense, camera, axis):
-    """Return the motion of the photos of a camera during the readout of their rows (1) or columns (0)."""
+def read(dense, axis):
+    """Return the motion of all photos during the readout of their rows (1) or columns (0)."""
     time = dense.block.image_xy[:, axis] / (WIDTH, HEIGHT)[axis] - 0.5
-    photos = dense.survey.photos
-    time = np.where(dense.survey.of_camera[photos] == camera, time, 0.0)
-    return [{"images": {"centre": time[:, np.newaxis] * dense.survey.velocities[photos]}}]
+    return [{"images": {"centre": time[:, np.newaxis] * dense.survey.velocities[dense.survey.photos]}}]
 
 
 def assigned(dense, step):
@@ -92,6 +90,7 @@ SETS = {
     "camera-exchanged": lambda n, _: [
         camera(n, np.array([0, -1, 1, 0]) * np.subtract(*n.survey.cameras[0, 1:3]))
     ],
+    "camera-size": lambda n, _: [camera(n, [*n.survey.cameras[0, :3], 0])],
     "camera-f-strip": lambda n, k: [camera(n, [1, 0, 0, 0], n.survey.strips == k)],
     "camera-f-half": lambda n, k: [camera(n, [1, 0, 0, 0], k == HALF)],
     "camera-f-single": lambda n, k: [camera(n, [1, 0, 0, 0], n.survey.of_camera == k)],
@@ -104,8 +103,8 @@ SETS = {
     "photo": lambda n, k: [
         pixels(n, lambda xy, e=e: np.outer(n.survey.photos == k, e)) for e in AXES[:2, :2]
     ],
-    "readout-time": lambda n, k: read(n, k, 1),
-    "readout-time-columns": lambda n, k: read(n, k, 0),
+    "readout-time": lambda n, _: read(n, 1),
+    "readout-time-columns": lambda n, _: read(n, 0),
     "object-point": lambda n, k: [{"images": {"point": np.outer(n.survey.seen == k, e)}} for e in AXES],
     "distance-scale": lambda n, _: [{"distances": {"shift": MODELS["distances"](n.rows["distances"])}}],
     "scale": lambda n, _: [places(n, lambda own: away(n, own), BOTH)],

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from dense_network import Survey
 from photogram import (
     Block,
     Camera,
@@ -537,13 +538,15 @@ def test_wrong_fixed_coordinates_of_a_point_with_distances_are_named():
     assert first.fields["point"] == block.point_ids[point]
 
 
-def test_images_of_another_size_are_named():
-    """All pixels of images of half the size; positions without control show the principal distance."""
-    camera = Camera("simple_pinhole", {"f": 3600.0, "cx": 2000.0, "cy": 1500.0})
-    block = simulate(strips=3, photos_per_strip=8, camera=camera, position_sd=0.02, seed=6).block
-    half = Camera("simple_pinhole", {name: 0.5 * value for name, value in camera.parameters.items()})
-    named = adjust(block.replace(cameras=[half])).verdict.message.fields["errors"][0].fields["named"]
-    assert named.code == "hypothesis.camera-size"
+@pytest.mark.parametrize("size", [0.98, 1.1])
+def test_images_of_another_size_are_named(size):
+    """The principal distance and the principal point change by one factor; poses are observed."""
+    block = Survey(weighted=False, points=100).block(np.random.default_rng(1))
+    values = {**block.cameras[0].parameters}
+    values |= {name: size * values[name] for name in ("f", "cx", "cy")}
+    result = adjust(block.replace(cameras=[Camera("simple_radial", values)] * 2))
+    first = result.verdict.message.fields["errors"][0]
+    assert first.fields["named"].code == "hypothesis.camera-size"
 
 
 @pytest.mark.parametrize("strips", [1, 4])

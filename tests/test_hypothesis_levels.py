@@ -12,7 +12,7 @@ from test_dense_hypotheses import SETS, SINGLE
 
 RUNS = 150
 OF_WEIGHTED = frozenset({"position", "attitude", "camera", "camera-radial"})
-OF_OBSERVED = frozenset({"camera-f", "camera-term", "camera-f-single"})
+OF_OBSERVED = frozenset({"camera-f", "camera-term", "camera-size", "camera-f-single"})
 """Codes of networks with weighted photos and camera only, and with observed poses and fixed cameras only."""
 
 
