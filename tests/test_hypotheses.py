@@ -561,6 +561,17 @@ def test_another_origin_of_the_images_of_a_photo_is_named(strips, share, positio
     assert first.fields["photo"] == block.photo_ids[3]
 
 
+def test_a_strip_of_many_is_named():
+    """Of more than eight strips those with notable differences of their positions are tested."""
+    block = simulate(strips=10, photos_per_strip=5, position_sd=0.05, seed=4).block
+    observed = block.photo_positions_observed.copy()
+    observed[15:20] += [0.4, -0.3, 0.3]  # The fourth strip
+    clean, wrong = adjust(block), adjust(block.replace(photo_positions_observed=observed))
+    assert "gnss-set" not in clean._hypotheses().code
+    first = wrong.verdict.message.fields["errors"][0].fields["named"]
+    assert (first.code, first.fields["set"]) == ("hypothesis.gnss-set", 4)
+
+
 def test_a_scale_of_one_of_two_distances_is_an_error_of_this_distance():
     """With one precise and one imprecise distance, the scale of both is the error of the precise one."""
     block = block_of("clean")

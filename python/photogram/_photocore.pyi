@@ -1401,7 +1401,7 @@ class NetworkTrial:
         *,
         velocities: _Floats,
         times: list[float],
-        position_sets: list[int],
+        position_sets: list[int | None],
         control_sets: list[int | None],
         readouts: list[list[list[float]]],
         widths: list[float],
@@ -1424,7 +1424,8 @@ class NetworkTrial:
         velocities, times
             (P, 3) velocities of photos in the object space by time, and (P,) times; empty if unknown.
         position_sets, control_sets
-            The set (strip, file) of the position of each photo, and of each control point; empty for none.
+            The set (strip, file) of the position of each photo, and of each control point, or None; empty for
+            none.
         readouts
             For each camera a, b, c if rows are read one after the other, and if columns are. The time of x, y
             within the readout is a x + b y + c, -1/2 to 1/2.

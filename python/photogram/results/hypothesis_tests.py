@@ -13,7 +13,16 @@ from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.results.hypotheses import DETECTION, SHARES, WHOLE, Effect, Hypotheses
 from photogram.results.hypothesis_checks import Joint, single_checks, with_checks
-from photogram.results.network_trial import IMAGE, NO_FACTS, Facts, NamedSuspects, NetworkTrial, Tests
+from photogram.results.network_trial import (
+    IMAGE,
+    MEDIAN,
+    NO_FACTS,
+    NOTABLE,
+    Facts,
+    NamedSuspects,
+    NetworkTrial,
+    Tests,
+)
 from photogram.show.quantity import Axis
 from photogram.statistics.findings import ALTERNATIVES, Tested
 
@@ -21,8 +30,6 @@ EFFECTS = 16  # Groups with computed effects: those of the largest bias-to-noise
 DRAWN = 300  # Largest number of points whose changes are stored for plots
 ALL_PHOTOS = 16  # Largest number of photos that are all tested for a shift
 MOST_PHOTOS = 4  # Of more photos, this number is tested: those with the largest mean residuals
-NOTABLE = 20.0  # Least square of a mean residual of these, in medians, is larger by 4 ln n for n photos
-MEDIAN = 0.4549  # Of chi-square with one degree of freedom
 
 
 def hypotheses(
@@ -46,7 +53,7 @@ def hypotheses(
     adjusted = np.flatnonzero(np.bincount(suspects.points[images]))
     drawn = sampled(adjusted, DRAWN)
     core = {**NO_FACTS, **facts}
-    timed, agreement = (core.pop(name, None) for name in ("timed", "agreement"))
+    timed, agreement, strips = (core.pop(name, None) for name in ("timed", "agreement", "strips"))
     checks = len(core["checks"])
     core["checks"] = [*core["checks"], *drawn.tolist()]
     joint: Joint | None = None
@@ -67,6 +74,9 @@ def hypotheses(
     found = trial.core.hypotheses(
         **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS
     )
+    if strips is not None:
+        of_strips = np.isin(found["code"], ("gnss-set", "camera-f-strip"))
+        found["index"][of_strips] = np.array(strips)[found["index"][of_strips]]
     effects, relative, alone = {}, set[int](), np.nan_to_num(found["statistic"])
     groups = _groups(suspects, found["group"], found["index"])
     for row, (*sizes, changes) in found["effects"].items():

@@ -369,7 +369,10 @@ class BlockSuspects(NamedSuspects):
 
 Facts = dict[str, Any]  # See `NetworkTrial.hypotheses`
 
-MOST_SETS = 8  # Largest number of sets of positions or control that are tested
+MOST_SETS = 8  # Largest number of sets of positions or control that are all tested
+MOST_STRIPS = 4  # Of more strips, this number is tested: those with the largest mean differences
+NOTABLE = 20.0  # Least square of a mean of these, in medians, is larger by 4 ln n for n means
+MEDIAN = 0.4549  # Of chi-square with one degree of freedom
 
 NO_FACTS: Facts = {
     "velocities": np.empty((0, 3)),
@@ -381,6 +384,21 @@ NO_FACTS: Facts = {
     "checks": [],
     "centre": None,
 }
+
+
+def suspected_strips(differences: Sequence[Floats]) -> list[int]:
+    """Return those of many strips whose positions have notable means of (k, 3) differences.
+
+    The unit of their squares is the median of all strips.
+    """
+    means = np.array([own.mean(axis=0) * math.sqrt(len(own)) for own in differences])
+    if not np.isfinite(means).all():
+        return []
+    usual = np.maximum(np.median(means**2, axis=0), np.finfo(float).tiny)
+    squares = MEDIAN * (means**2 / usual).sum(axis=1)
+    count = np.count_nonzero(squares > NOTABLE + 4 * math.log(len(squares)))
+    largest = np.argsort(-squares, kind="stable")[: min(max(count, 2), MOST_STRIPS)]
+    return sorted(largest.tolist()) if count else []
 
 
 def block_facts(block: Block, places: Floats) -> Facts:
@@ -428,8 +446,12 @@ def block_facts(block: Block, places: Floats) -> Facts:
     if count > 1:
         # Without times, the order of the photos is used.
         facts |= {"times": times.tolist(), "timed": timed}
-    if 1 < len(strips) <= MOST_SETS:
-        facts["position_sets"] = sets.tolist()
+    chosen = [*range(len(strips))]
+    if len(strips) > MOST_SETS:
+        chosen = suspected_strips([observed[strip] - places[strip] for strip in strips])
+    if len(chosen) > 1:
+        number = {strip: place for place, strip in enumerate(chosen)}  # Sets have consecutive numbers
+        facts |= {"position_sets": [number.get(strip) for strip in sets.tolist()], "strips": chosen}
     held = np.isfinite(block.point_sd)
     control = np.flatnonzero(held.any(axis=1))
     # Coordinates without standard deviation may be unknown.
