@@ -126,3 +126,4 @@ def test_snooping_has_the_same_words():
     assert found.verdict.code == "usable-after-removal"
     assert ("line.board", 8) in {(each.code, each.fields.get("n")) for each in found.verdict.lines}
     assert found.verdict == found.result.verdict
+    assert start.replace(sd0=None).snoop().result.known_weight  # the tests of data snooping assume it

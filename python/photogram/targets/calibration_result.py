@@ -86,8 +86,8 @@ class Calibrated(Result):
 
     @property
     def known_weight(self) -> bool:
-        """Whether the standard deviation of corners is given."""
-        return self.calibration.sd0 is not None
+        """Whether the standard deviation of corners is given, or assumed by data snooping."""
+        return self.calibration.sd0 is not None or self.snooped is not None
 
     @property
     def global_test(self) -> GlobalTest | None:
