@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -82,7 +83,7 @@ def calibration_document(calibration: Calibration) -> Document:
             Section.of(verdict_table(verdict)),
             remarks_section(calibration.messages),
         ],
-        members=_members(calibration),
+        members=partial(_members, calibration),
     )
 
 
