@@ -31,12 +31,11 @@ MAX_LEG = 4
 class Header:
     """The header card, FORMAT (5I1,I2,A1,1X,20I3,2X,A8,I1)."""
 
-    left_handed: bool  # Columns 1 and 2
+    left_handed: bool  # Columns 1 to 5
     sorted_input: bool
-    # Column 3: the least count is not one micrometre (comparator 11 has separate unit digits)
-    other_least_count: bool
-    skip_card: bool  # Column 4: skip one card before the data
-    plot_each_case: bool  # Column 5, as in the text (the listing reverses it)
+    other_least_count: bool  # Not one micrometre (comparator 11 has separate unit digits)
+    skip_card: bool  # Skip one card before the data
+    plot_each_case: bool  # As in the text (the listing reverses it)
     comparator: int  # Columns 6-7; 0 ends the job
     secondary: bool  # Column 8 holds R: the right stage of a stereocomparator
     operators: tuple[int, ...]  # Columns 10-69: operator of each case, 0 if none
@@ -94,16 +93,8 @@ def _micrometres(record: Record, columns: tuple[int, int], decimals: int) -> flo
 
 
 def _header(record: Record) -> Header:
-
-    def flag(column: int) -> bool:
-        return _integer(record, column, column) != 0
-
     header = Header(
-        left_handed=flag(1),
-        sorted_input=flag(2),
-        other_least_count=flag(3),
-        skip_card=flag(4),
-        plot_each_case=flag(5),
+        *(_integer(record, column, column) != 0 for column in range(1, 6)),
         comparator=_integer(record, 6, 7),
         secondary=record.columns(8, 8) == "R",
         operators=tuple(_integer(record, 10 + 3 * case, 12 + 3 * case) for case in range(CASES)),

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.comparator.combined_solution import SinglePolynomial
+from photogram.comparator.combined_solution import CombinedPolynomial, SinglePolynomial
 from photogram.comparator.correction import Correction
 from photogram.comparator.fits import Decomposition, Residuals
 from photogram.comparator.polynomial import TERMS, Polynomial
@@ -51,33 +51,28 @@ def polynomial_lines(polynomial: Polynomial, covariance: Floats) -> list[str]:
     return lines
 
 
+def covariance_lines(fit: SinglePolynomial | CombinedPolynomial) -> list[str]:
+    """Return the coefficients with their covariances, which are equal in x and in y."""
+    return [
+        *polynomial_lines(fit.polynomial, fit.covariance),
+        "  VARIANCES AND COVARIANCES, IN X AND IN Y (METERS)",
+        *triangle(LETTERS, fit.covariance[:9, :9]),
+    ]
+
+
 def case_linear_page(case: CaseResult) -> list[str]:
     """Return the page of the linear adjustment of one case."""
     fit = case.linear
-    own = fit.parameters
-    return [
-        *centred(f"CASE NUMBER {case.number} LINEAR ADJUSTMENT"),
-        nearest(case),
-        "",
-        *linear_lines(own, fit.covariance),
-        f"  ROTATION {angle(own.rotation_rad)}   SIGMA {math.sqrt(fit.covariance[3, 3]) / ARCSEC:8.3f} SEC",
-        "",
-        *residual_lines(fit.residuals),
-    ]
+    own, sd = fit.parameters, math.sqrt(fit.covariance[3, 3]) / ARCSEC
+    rotation = f"  ROTATION {angle(own.rotation_rad)}   SIGMA {sd:8.3f} SEC"
+    lines = [*linear_lines(own, fit.covariance), rotation, ""]
+    return residual_page(f"CASE NUMBER {case.number} LINEAR ADJUSTMENT", case, fit.residuals, lines)
 
 
 def case_polynomial_page(case: CaseResult, single: SinglePolynomial) -> list[str]:
     """Return the page of the polynomials of one case."""
-    return [
-        *centred(f"CASE NUMBER {case.number} NONLINEAR ADJUSTMENT"),
-        nearest(case),
-        "",
-        *polynomial_lines(single.polynomial, single.covariance),
-        "  VARIANCES AND COVARIANCES, IN X AND IN Y (METERS)",
-        *triangle(LETTERS, single.covariance[:9, :9]),
-        "",
-        *residual_lines(single.residuals),
-    ]
+    title = f"CASE NUMBER {case.number} NONLINEAR ADJUSTMENT"
+    return residual_page(title, case, single.residuals, [*covariance_lines(single), ""])
 
 
 def combined_linear_page(calibration: Calibration) -> list[str]:
@@ -107,9 +102,7 @@ def combined_polynomial_page(calibration: Calibration) -> list[str]:
     sigma_x, sigma_y = nonlinear.sigma_um
     return [
         *centred(f"COMBINED NONLINEAR ADJUSTMENT OF {len(calibration.cases)} CASES"),
-        *polynomial_lines(nonlinear.polynomial, nonlinear.covariance),
-        "  VARIANCES AND COVARIANCES, IN X AND IN Y (METERS)",
-        *triangle(LETTERS, nonlinear.covariance[:9, :9]),
+        *covariance_lines(nonlinear),
         "",
         f"  SIGMA X = {sigma_x:.4f}   SIGMA Y = {sigma_y:.4f}"
         f"   STANDARD ERROR OF UNIT WEIGHT = {nonlinear.sigma0_um:.4f} MICRONS"
@@ -244,9 +237,11 @@ HEAD = [
 ]
 
 
-def residual_page(title: str, case: CaseResult, residuals: Residuals) -> list[str]:
-    """Return a page of residuals."""
-    return [*centred(title), nearest(case), "", *residual_lines(residuals)]
+def residual_page(
+    title: str, case: CaseResult, residuals: Residuals, parameters: Sequence[str] = ()
+) -> list[str]:
+    """Return a page of parameters and residuals."""
+    return [*centred(title), nearest(case), "", *parameters, *residual_lines(residuals)]
 
 
 def residual_lines(residuals: Residuals) -> list[str]:

@@ -118,12 +118,9 @@ def _figures(frame: Frame, bent: bool) -> tuple[Floats, tuple[str, ...], tuple[s
     names, units = ["scale x", "scale y", "lack of orthogonality"], ["um/m", "um/m", "arc seconds"]
     if bent:
         shapes = [(axis, along, degree) for axis in (0, 1) for along in (0, 1) for degree in (2, 3, 4)]
-        more = np.zeros((len(shapes), 18))
-        for row, (axis, along, degree) in enumerate(shapes):
-            more[row, at(degree + 4 * along, axis)] = 1.0
-            names.append(f"degree {degree} of {'xy'[axis]} along {'xy'[along]}")
-            units.append("um")
-        rows = np.vstack([rows, more])
+        more = [at(degree + 4 * along, axis) for axis, along, degree in shapes]
+        names += [f"degree {degree} of {'xy'[axis]} along {'xy'[along]}" for axis, along, degree in shapes]
+        rows, units = np.vstack([rows, np.eye(18)[more]]), units + ["um"] * len(shapes)
     return rows, tuple(names), tuple(units)
 
 
