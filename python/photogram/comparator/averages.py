@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -225,13 +226,14 @@ class GridSigma:
         rows = [grids[case.case.plate].rows_of(case.points) for case in cases]
         plates = dict.fromkeys(case.case.plate for case in cases)
         self.reduction = reduction = Reduction.of(stage)
-        self.errors = {plate: GridErrors(plate, rows, cases, stage) for plate in plates}
+        self.errors = {plate: GridErrors(plate, rows, cases, stage, reduction) for plate in plates}
         residuals = np.vstack([fit.residuals.comparator_um for fit in stage.cases])
         forms, squares = np.empty((len(plates) + 1, len(plates) + 1)), np.empty(len(plates) + 1)
         for row, errors in enumerate(self.errors.values()):
             forms[row, :-1] = [reduction.averages_of_errors(errors, each) for each in self.errors.values()]
             forms[row, -1] = reduction.averages_of_units(errors)
-            squares[row] = float((errors.average(residuals) ** 2).sum())
+            gathered = errors.gathered(residuals[..., np.newaxis])[..., 0]
+            squares[row] = float(((gathered.T / errors.counts) ** 2).sum())
         forms[-1, :-1] = [reduction.squares_of_errors(errors) for errors in self.errors.values()]
         forms[-1, -1] = reduction.squares_of_units()
         squares[-1] = float((residuals**2).sum())
@@ -269,6 +271,7 @@ class GridErrors:
         grid_rows: Sequence[Indices],
         cases: Sequence[PlacedCase],
         stage: CombinedLinear | CombinedPolynomial,
+        reduction: Reduction,
     ) -> None:
         own = [k for k, case in enumerate(cases) if case.case.plate == plate]
         sizes = [len(case.points) for case in cases]
@@ -284,15 +287,15 @@ class GridErrors:
         # (n, 2, 2) blocks: rotations, mirrored if the comparator is left-handed
         self.turns = np.repeat(turns, [sizes[k] for k in own], axis=0)[order]
         self.counts = np.diff([*self.starts, len(order)])  # Number of cases per point
+        # E^T U and E^T W, A U and A W, and (A U)^T (A U), (E^T W)^T (E^T W)
+        self.left, self.right = self.gathered(reduction.left), self.gathered(reduction.right)
+        self.mean_left, self.mean_right = ((each.T / self.counts).T for each in (self.left, self.right))
+        self.products = _product(self.mean_left, self.mean_left), _product(self.right, self.right)
 
     def gathered(self, values: Floats) -> Floats:
         """Return E^T times columns: (measured points, 2, k) to (plate points, 2, k)."""
-        turned = np.einsum("nji,nj...->ni...", self.turns, values[self.rows])
+        turned = self.turns.transpose(0, 2, 1) @ values[self.rows]
         return np.asarray(np.add.reduceat(turned, self.starts))
-
-    def average(self, values: Floats) -> Floats:
-        """Return A times columns: rotated into the grid system and averaged by point, up to sign."""
-        return np.asarray((self.gathered(values).T / self.counts).T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -328,34 +331,39 @@ class Reduction:
         left, right = _without(rigid, both), _without(first, both)
         return cls(np.concatenate([first, left], axis=2), np.concatenate([first, right], axis=2))
 
+    @cached_property
+    def products(self) -> tuple[Floats, Floats]:
+        """U^T U and W^T W."""
+        return _product(self.left, self.left), _product(self.right, self.right)
+
     def variances(self) -> Floats:
         """Return the diagonal of R R^T, (m, 2): residual variances for unit variance."""
-        left = self.left @ _product(self.right, self.right) - 2 * self.right
+        left = self.left @ self.products[1] - 2 * self.right
         return np.asarray(1 + (left * self.left).sum(axis=2))
 
     def squares_of_units(self) -> float:
         """Sum of squares of R: expected squares of residuals for unit variance."""
-        return self.left[..., 0].size + _squares(self.left, self.right, self.left, self.right)
+        return self.left[..., 0].size + _squares(self.left, self.right, *self.products)
 
     def squares_of_errors(self, errors: GridErrors) -> float:
         """Sum of squares of R E."""
-        left, right = errors.gathered(self.left), errors.gathered(self.right)
-        return 2 * len(errors.rows) + _squares(left, right, self.left, right)
+        products = self.products[0], errors.products[1]
+        return 2 * len(errors.rows) + _squares(errors.left, errors.right, *products)
 
     def averages_of_units(self, errors: GridErrors) -> float:
         """Sum of squares of A R, with A the average by point."""
-        left, right = errors.average(self.left), errors.average(self.right)
-        return float((2 / errors.counts).sum()) + _squares(left, right, left, self.right)
+        products = errors.products[0], self.products[1]
+        return float((2 / errors.counts).sum()) + _squares(errors.mean_left, errors.mean_right, *products)
 
     def averages_of_errors(self, averaged: GridErrors, errors: GridErrors, *, lost: bool = False) -> float:
         """Sum of squares of A R E, A of one plate, E of the same or another.
 
         With `lost`, sum of squares of I - A R E of one plate: the errors that averages do not show.
         """
-        left, right = averaged.average(self.left), errors.gathered(self.right)
+        products = averaged.products[0], errors.products[1]
         if averaged is not errors or lost:  # A E = 0, or subtracted
-            return float((_product(left, left) * _product(right, right)).sum())
-        return 2 * len(errors.counts) + _squares(left, right, left, right)
+            return float((products[0] * products[1]).sum())
+        return 2 * len(errors.counts) + _squares(averaged.mean_left, errors.right, *products)
 
 
 def _product(first: Floats, second: Floats) -> Floats:
@@ -369,5 +377,5 @@ def _without(basis: Floats, columns: Floats) -> Floats:
 
 
 def _squares(one: Floats, other: Floats, left: Floats, right: Floats) -> float:
-    """Return the last two traces of |A R E|^2: of `one` and `other`, and of `left` and `right`."""
-    return float((_product(left, left) * _product(right, right)).sum() - 2 * (one * other).sum())
+    """Return the last two traces of |A R E|^2: of two factors, and of the products of columns."""
+    return float((left * right).sum() - 2 * (one * other).sum())
