@@ -72,7 +72,7 @@ def plate_document(result: Result) -> Document:
         Section("residuals", "Residuals", [Facts("Residuals", _residuals(result))]),
         *of_solution.values(),
         Section.of(tables.pre_run(result)),
-        *map(Section.of, tables.fictitious(result)),
+        Section.of(tables.fictitious(result)),
         Section("histogram", "Histogram of residuals", [Layers("histogram-layers", histograms)]),
         *_combined(result),
     ]

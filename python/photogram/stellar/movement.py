@@ -70,10 +70,11 @@ def movement(result: Result) -> tuple[Movement, ...]:
 
 
 def fictitious_points(result: Result) -> FictitiousPoints:
-    """Compute the directions of the nine points for every attitude, with covariances."""
-    groups = _solved(result)
+    """Compute the directions of the nine points for every attitude of the movement test."""
+    groups = _solved(result) if result.movement else []
+    none = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, len(NAMES)))
     found = [_directions(result, group) for group in groups]
-    places, local, by = (np.concatenate(parts) for parts in zip(*found, strict=True))
+    places, local, by = (np.concatenate(parts) for parts in zip(none, *found, strict=True))
     local[:, 0] %= 2 * np.pi
     names = np.repeat([GROUPS[group] for group in groups], len(_DIAGONAL)).tolist()
     covariances = by @ result.covariance @ np.swapaxes(by, 1, 2)

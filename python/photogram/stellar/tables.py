@@ -217,10 +217,8 @@ def _places(places: Floats) -> list[Quantity]:
     ]
 
 
-def fictitious(result: Result) -> list[Table]:
+def fictitious(result: Result) -> Table:
     """Return directions of plate points for every attitude, with orientation ellipses."""
-    if not result.movement:
-        return []
     found = fictitious_points(result)
     declinations = found.places[:, 1]
     deviations = np.sqrt(np.diagonal(found.covariances, axis1=1, axis2=2))
@@ -236,7 +234,7 @@ def fictitious(result: Result) -> list[Table]:
         *_ellipses(mean_error_ellipses(found.covariances, declinations), "orientation"),
         Quantity(found.covariances, member="covariance"),
     ]
-    return [Table("fictitious_points", "Fictitious points on the diagonal", columns, about=_AZIMUTHS)]
+    return Table("fictitious_points", "Fictitious points on the diagonal", columns, about=_AZIMUTHS)
 
 
 def images(result: Result) -> Table:
