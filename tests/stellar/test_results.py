@@ -24,7 +24,6 @@ from photogram.stellar import (
     read_plain,
 )
 from photogram.stellar.curves import comparator_frame
-from photogram.stellar.movement import fictitious_points
 
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar" / "plate.toml"))
 
@@ -158,15 +157,14 @@ def test_the_combined_solution_has_all_tables(still):
 
 def test_fictitious_points_agree_with_the_movement_test(still):
     result = calibrate(still)
-    points = fictitious_points(result)
-    rows = {key: row for row, key in enumerate(zip(points.groups, points.xy.tolist(), strict=True))}
-    assert len(rows) == 27
-    for m in result.movement:
-        a, b = rows[m.first, m.xy], rows[m.second, m.xy]
-        elevations = points.horizontal[:, 1]
-        assert elevations[b] - elevations[a] == pytest.approx(m.differences[3], abs=1e-12)
-        # Each direction's own error is at least a part of their difference's.
-        assert np.linalg.eigvalsh(points.covariances[a])[0] > 0
+    found = result.movement
+    assert found.places.shape == (3, 9, 2)
+    for pair, differences in zip(found.pairs, found.differences, strict=True):
+        first, second = (found.groups.index(name) for name in pair)
+        rises = found.horizontal[second, :, 1] - found.horizontal[first, :, 1]
+        assert rises == pytest.approx(differences[:, 3], abs=1e-12)
+    # Each direction's own error is at least a part of their difference's.
+    assert (np.linalg.eigvalsh(found.covariances)[..., 0] > 0).all()
 
 
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 90.0, -45.0])

@@ -210,10 +210,10 @@ def _remarked(result: Result, remarks: Sequence[Phrase]) -> Result:
 
 def _combined(result: Result, threads: int | None) -> Result:
     test = movement(result)
+    if test is None:
+        return result
     pairs = pairs_to_combine(test, result.problem.options.movement_factor)
     result = replace(result, movement=test)
-    if not test:
-        return result
     if not pairs:
         return replace(result, messages=(*result.messages, Message(phrase("stars.moved-between-all"))))
     combined = combine(result, pairs, threads=threads)

@@ -19,82 +19,63 @@ if TYPE_CHECKING:
     from photogram.stellar import Result
 
 
-@dataclass(frozen=True)
-class Movement:
-    """Comparison of a fictitious point under two attitudes."""
-
-    first: str  # The groups
-    second: str
-    xy: float  # x = y of the point, metres
-    angle: float  # Angle between its two directions, radians
-    mean_error: float
-    # Second minus first: right ascension times cos(declination), declination, azimuth times sin(zenith
-    # distance), elevation; radians
-    differences: tuple[float, float, float, float]
-
-
 @dataclass(frozen=True, eq=False)
-class FictitiousPoints:
-    """Directions of n plate points under estimated attitudes, radians."""
+class Movement:
+    """Directions of nine plate points under G estimated attitudes, compared for P pairs; radians."""
 
     groups: tuple[str, ...]  # Groups of the attitudes
-    xy: Floats  # (n,) x = y of the points, metres
-    places: Floats  # (n, 2) apparent right ascension and declination
-    horizontal: Floats  # (n, 2) observed (refracted) azimuth from south, positive west, and elevation
-    covariances: Floats  # (n, 2, 2) of the positions, from the orientation
+    places: Floats  # (G, 9, 2) apparent right ascension and declination
+    horizontal: Floats  # (G, 9, 2) observed (refracted) azimuth from south, positive west, and elevation
+    covariances: Floats  # (G, 9, 2, 2) of the positions, from the orientation
+    pairs: tuple[tuple[str, str], ...]  # First and second group
+    angles: Floats  # (P, 9) angles between the directions, and their mean errors
+    mean_errors: Floats
+    # (P, 9, 4) second minus first: right ascension times cos(declination), declination, azimuth times
+    # sin(zenith distance), elevation
+    differences: Floats
 
 
-_DIAGONAL = np.arange(9) * 0.01  # x = y of the fictitious points, metres
-PAIRS = ((0, 1), (1, 2), (0, 2))  # Post minus pre, event minus post, event minus pre
+DIAGONAL = np.arange(9) * 0.01  # x = y of the points, metres
+PAIRS = (("pre", "post"), ("post", "event"), ("pre", "event"))
 
 
-def movement(result: Result) -> tuple[Movement, ...]:
-    """Compare the directions of nine diagonal points for all pairs of attitudes.
+def movement(result: Result) -> Movement | None:
+    """Compare the directions of nine diagonal points for all pairs of attitudes; None without pairs.
 
     The mean error follows from the covariance of all parameters, since both attitudes share the camera.
     """
-    directions = {g: _directions(result, g) for g in _solved(result)}
-    tests = []
-    for first, second in PAIRS:
-        if first not in directions or second not in directions:
-            continue
-        for xy, a, local_a, by_a, b, local_b, by_b in zip(
-            _DIAGONAL.tolist(), *directions[first], *directions[second], strict=True
-        ):
-            angle, row = _angle(a, b)
-            total = row @ np.vstack([by_a, by_b])
-            error = result.mean_error * float(np.sqrt(total @ result.solved.cofactors @ total))
-            differences = _differences(a, b, local_a, local_b)
-            tests.append(Movement(GROUPS[first], GROUPS[second], xy, angle, error, differences))
-    return tuple(tests)
+    free = result.solved.free
+    groups = tuple(name for k, name in enumerate(GROUPS) if free[3 * k : 3 * k + 3].all())
+    pairs = tuple(pair for pair in PAIRS if {*pair} <= {*groups})
+    if not pairs:
+        return None
+    points = [_directions(result, GROUPS.index(name)) for name in groups]
+    places, local, by = (np.stack(parts) for parts in zip(*points, strict=True))
+    a, b = ([groups.index(pair[k]) for pair in pairs] for k in (0, 1))
+    angles, rows = _angles(places[a], places[b])
+    total = np.einsum("pni,pnij->pnj", rows, np.concatenate([by[a], by[b]], axis=2))
+    variances = np.einsum("pni,ij,pnj->pn", total, result.solved.cofactors, total)
+    turns = np.concatenate([places[b] - places[a], local[b] - local[a]], axis=2)
+    turns[..., ::2] = np.remainder(turns[..., ::2] + np.pi, 2 * np.pi) - np.pi
+    turns[..., 0] *= np.cos(places[a][..., 1])
+    turns[..., 2] *= np.cos(local[a][..., 1])
+    local[..., 0] %= 2 * np.pi
+    covariances = by @ result.covariance @ np.swapaxes(by, 2, 3)
+    errors = result.mean_error * np.sqrt(variances)
+    return Movement(groups, places, local, covariances, pairs, angles, errors, turns)
 
 
-def fictitious_points(result: Result) -> FictitiousPoints:
-    """Compute the directions of the nine points for every attitude of the movement test."""
-    groups = _solved(result) if result.movement else []
-    none = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, len(NAMES)))
-    found = [_directions(result, group) for group in groups]
-    places, local, by = (np.concatenate(parts) for parts in zip(none, *found, strict=True))
-    local[:, 0] %= 2 * np.pi
-    names = np.repeat([GROUPS[group] for group in groups], len(_DIAGONAL)).tolist()
-    covariances = by @ result.covariance @ np.swapaxes(by, 1, 2)
-    return FictitiousPoints(tuple(names), np.tile(_DIAGONAL, len(groups)), places, local, covariances)
-
-
-def _solved(result: Result) -> list[int]:
-    return [g for g in range(3) if result.solved.free[3 * g : 3 * g + 3].all()]
-
-
-def pairs_to_combine(test: tuple[Movement, ...], factor: float) -> tuple[tuple[str, str], ...]:
+def pairs_to_combine(test: Movement, factor: float) -> tuple[tuple[str, str], ...]:
     """Return pairs whose centre directions differ by less than `factor` mean errors."""
-    return tuple((m.first, m.second) for m in test if m.xy == 0 and m.angle < factor * m.mean_error)
+    near = test.angles[:, 0] < factor * test.mean_errors[:, 0]
+    return tuple(pair for pair, chosen in zip(test.pairs, near, strict=True) if chosen)
 
 
 def _directions(result: Result, group: int) -> tuple[Floats, Floats, Floats]:
     """Return directions, azimuths and elevations of points, and direction partials."""
     problem, parameters = result.problem, result.solved.parameters
-    count, index, kind = len(_DIAGONAL), np.arange(len(_DIAGONAL)), problem.options.camera_kind
-    xy = np.column_stack([_DIAGONAL, _DIAGONAL])
+    count, index, kind = len(DIAGONAL), np.arange(len(DIAGONAL)), problem.options.camera_kind
+    xy = np.column_stack([DIAGONAL, DIAGONAL])
     time = np.full(count, problem.options.movement_time)
     standard = _photocore.plate_directions(
         xy, parameters[3 * group : 3 * group + 3], parameters[9:22], kind, tolerance=1e-15, passes=100
@@ -124,33 +105,19 @@ def _directions(result: Result, group: int) -> tuple[Floats, Floats, Floats]:
     return places, local, np.asarray(-np.linalg.solve(equations["star"], rows), float)
 
 
-def _angle(a: Floats, b: Floats) -> tuple[float, Floats]:
-    """Return the angle of two directions, and its partials (equations 100 and 102).
+def _angles(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+    """Return angles of directions (..., 2), and their partials (..., 4) by both (equations 100 and 102).
 
     Partials for equal directions are undefined and replaced by those for a movement along the meridian.
     """
-    (sa, ca), (sb, cb) = (np.sin(a[1]), np.cos(a[1])), (np.sin(b[1]), np.cos(b[1]))
-    sd, cd = np.sin(b[0] - a[0]), np.cos(b[0] - a[0])
-    across, along = cb * sd, ca * sb - sa * cb * cd
-    sine = float(np.hypot(across, along))
-    angle = float(np.arctan2(sine, sa * sb + ca * cb * cd))
-    if sine < 0.5e-11:
-        return angle, np.array([0.0, -1.0, 0.0, 1.0])
+    (sa, ca), (sb, cb) = ((np.sin(each[..., 1]), np.cos(each[..., 1])) for each in (a, b))
+    sd, cd = np.sin(b[..., 0] - a[..., 0]), np.cos(b[..., 0] - a[..., 0])
+    sine = np.hypot(cb * sd, ca * sb - sa * cb * cd)
     # d cos(angle) = -sin(angle) d angle
-    by_ra = ca * cb * sd / sine
-    return angle, np.array([-by_ra, (sa * cb * cd - ca * sb) / sine, by_ra, (cb * -sa + sb * ca * cd) / sine])
-
-
-def _differences(a: Floats, b: Floats, local_a: Floats, local_b: Floats) -> tuple[float, float, float, float]:
-    def turn(angle: float) -> float:
-        return float(np.remainder(angle + np.pi, 2 * np.pi) - np.pi)
-
-    return (
-        turn(b[0] - a[0]) * float(np.cos(a[1])),
-        float(b[1] - a[1]),
-        turn(local_b[0] - local_a[0]) * float(np.cos(local_a[1])),
-        float(local_b[1] - local_a[1]),
-    )
+    partials = [-ca * cb * sd, sa * cb * cd - ca * sb, ca * cb * sd, cb * -sa + sb * ca * cd]
+    equal = (sine < 0.5e-11)[..., None]
+    rows = np.stack(partials, axis=-1) / np.where(equal, 1.0, sine[..., None])
+    return np.arctan2(sine, sa * sb + ca * cb * cd), np.where(equal, [0.0, -1.0, 0.0, 1.0], rows)
 
 
 def common_attitudes(pairs: tuple[tuple[str, str], ...]) -> tuple[Floats, list[int]]:
@@ -186,7 +153,7 @@ def combine(result: Result, pairs: tuple[tuple[str, str], ...], *, threads: int 
         solved = _modified(result, np.eye(len(spread))[rows] - spread[rows])
     else:
         solved = _iterated(result, spread, threads)
-    return replace(result, solved=replace(solved, counts=counts), pairs=pairs, movement=(), messages=())
+    return replace(result, solved=replace(solved, counts=counts), pairs=pairs, movement=None, messages=())
 
 
 def _modified(result: Result, c: Floats) -> Solved:

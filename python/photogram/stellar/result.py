@@ -68,7 +68,7 @@ class Result(Judged, Documented):
     given: Problem
     stages: tuple[Solved, ...] = ()
     pre_run: PreRun | None = None
-    movement: tuple[Movement, ...] = ()
+    movement: Movement | None = None
     combined: Result | None = None
     pairs: tuple[tuple[str, str], ...] = ()
     spoiled: str | Phrase = ""

@@ -34,7 +34,7 @@ from photogram.stellar.curves import (
     star_means,
 )
 from photogram.stellar.directions import mean_error_ellipses
-from photogram.stellar.movement import fictitious_points
+from photogram.stellar.movement import DIAGONAL
 from photogram.stellar.parameters import GRAD, GROUPS, NAMES, UNITS
 from photogram.stellar.problem import Counts
 
@@ -219,20 +219,23 @@ def _places(places: Floats) -> list[Quantity]:
 
 def fictitious(result: Result) -> Table:
     """Return directions of plate points for every attitude, with orientation ellipses."""
-    found = fictitious_points(result)
-    declinations = found.places[:, 1]
-    deviations = np.sqrt(np.diagonal(found.covariances, axis1=1, axis2=2))
-    deviations[:, 0] *= np.cos(declinations)
+    groups, places, horizontal, covariances = (), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, 2))
+    if (found := result.movement) is not None:
+        groups = np.repeat(found.groups, len(DIAGONAL)).tolist()
+        places, horizontal = found.places.reshape(-1, 2), found.horizontal.reshape(-1, 2)
+        covariances = found.covariances.reshape(-1, 2, 2)
+    deviations = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
+    deviations[:, 0] *= np.cos(places[:, 1])
     columns = [
-        names_column(found.groups, "Orientation", "group"),
-        column(found.xy, MM, "x = y", 0, "xy"),
-        Quantity(found.places, member="place"),
-        *_places(found.places),
-        column(found.horizontal[:, 0], DEGREES, "Azimuth S", 5, "azimuth"),
-        column(found.horizontal[:, 1], DEGREES, "Elevation", 5, "elevation"),
+        names_column(groups, "Orientation", "group"),
+        column(np.resize(DIAGONAL, len(places)), MM, "x = y", 0, "xy"),
+        Quantity(places, member="place"),
+        *_places(places),
+        column(horizontal[:, 0], DEGREES, "Azimuth S", 5, "azimuth"),
+        column(horizontal[:, 1], DEGREES, "Elevation", 5, "elevation"),
         column(deviations, ARCSEC_OF_RAD, "Mean error {}", 4, parts="ra, dec"),
-        *_ellipses(mean_error_ellipses(found.covariances, declinations), "orientation"),
-        Quantity(found.covariances, member="covariance"),
+        *_ellipses(mean_error_ellipses(covariances, places[:, 1]), "orientation"),
+        Quantity(covariances, member="covariance"),
     ]
     return Table("fictitious_points", "Fictitious points on the diagonal", columns, about=_AZIMUTHS)
 
@@ -287,15 +290,16 @@ def pre_run(result: Result) -> Table:
 def movement(result: Result) -> Table:
     """Return angles between the directions of a point under two attitudes."""
     found = result.movement
+    pairs = [pair for pair in found.pairs for _ in DIAGONAL] if found else []
     parts = "ra cos dec, declination, azimuth sin z, elevation"
     columns = [
-        names_column((f"{m.second} - {m.first}" for m in found), "Pair"),
-        of_each(found, "first"),
-        of_each(found, "second"),
-        column([m.xy for m in found], MM, "x = y", 0, "xy"),
-        column([m.angle for m in found], ARCSEC_OF_RAD, "Angle", 3, "angle"),
-        column([m.mean_error for m in found], ARCSEC_OF_RAD, "Mean error", 3, "mean_error"),
-        column([m.differences for m in found], ARCSEC_OF_RAD, "{}", 3, "differences", parts),
+        names_column((f"{second} - {first}" for first, second in pairs), "Pair"),
+        names_column((first for first, _ in pairs), "", "first"),
+        names_column((second for _, second in pairs), "", "second"),
+        column(np.resize(DIAGONAL, len(pairs)), MM, "x = y", 0, "xy"),
+        column(found.angles.ravel() if found else [], ARCSEC_OF_RAD, "Angle", 3, "angle"),
+        column(found.mean_errors.ravel() if found else [], ARCSEC_OF_RAD, "Mean error", 3, "mean_error"),
+        column(found.differences if found else [], ARCSEC_OF_RAD, "{}", 3, "differences", parts),
     ]
     about = "Angles between the directions of a point of the plate under two attitudes."
     return Table("movement", "Movement of the camera", columns, about=about)
