@@ -104,27 +104,21 @@ _INVISIBLE = 1e-6  # Relative information about a direction below which the othe
 _ATTITUDE = 3
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """Fit of an exposure to the camera of the others."""
+def held_out(exposures: Sequence[Exposure], found: SkyCalibration, night: Night) -> tuple[Floats, Floats]:
+    """Test each exposure, with adjusted attitudes, against the camera of the others.
 
-    # Root mean square of its residuals with that camera, over the prediction from the others; NaN if the
-    # others do not determine the camera
-    factor: float
-    probability: float  # of an equal or larger sum of squares with the unit weight of the others
-
-    def unlike(self, exposures: int) -> bool:
-        """Whether one of several exposures is inconsistent with the others."""
-        return self.factor > NOTABLE and self.probability < LEVEL / exposures
-
-
-def held_out(exposures: Sequence[Exposure], found: SkyCalibration, night: Night) -> list[HeldOut]:
-    """Test each exposure, with adjusted attitudes, against the camera of the others."""
+    Returns
+    -------
+    (E,) root mean squares of the residuals with that camera over the prediction from the others, NaN if these
+    do not determine the camera; (E,) probabilities of equal or larger sums of squares with the unit weight of
+    the others.
+    """
+    factors, probabilities = np.full(len(exposures), np.nan), np.ones(len(exposures))
     sd = np.sqrt(np.diag(found.camera.covariance))
     free = np.flatnonzero(sd > 0)
     unit, freedom = found.mean_error, found.degrees_of_freedom
     if not (freedom > 0 and unit > 0 and len(free)):
-        return [HeldOut(np.nan, 1.0)] * len(exposures)
+        return factors, probabilities
     scale, pixel_sd = sd[free] / unit, night.pixel_sd
     attitude, camera = partials(exposures, found.camera, night.site, night.catalogue, night.earth)
     camera = camera[:, :, free] * (scale / pixel_sd)
@@ -134,20 +128,18 @@ def held_out(exposures: Sequence[Exposure], found: SkyCalibration, night: Night)
     values, vectors = np.linalg.eigh(cofactors)
     camera = camera @ (vectors * np.sqrt(np.maximum(values, 0.0)))
     omega = unit**2 * freedom
-    tests = []
     for number in range(len(exposures)):
         of = found.exposures == number
         rows = camera[of].reshape(-1, len(free)), attitude[of].reshape(-1, _ATTITUDE)
         total, rank = _held_out(*rows, residuals[of].ravel())
         left = freedom - rank
         if rank < 1 or left < 1:
-            tests.append(HeldOut(np.nan, 1.0))
             continue
         # The sum of the others is negative only if the model is nonlinear.
         variance = max(omega - total, 1e-12 * total) / left
-        probability = _photocore.chi_square(total / variance, float(rank), upper=True)
-        tests.append(HeldOut(float(np.sqrt(total / rank / variance)), probability))
-    return tests
+        probabilities[number] = _photocore.chi_square(total / variance, float(rank), upper=True)
+        factors[number] = np.sqrt(total / rank / variance)
+    return factors, probabilities
 
 
 def fewer_stars(images: Indices, matched: Indices) -> list[int]:

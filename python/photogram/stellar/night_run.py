@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.stellar.comparison import fewer_stars, held_out
+from photogram.stellar.comparison import LEVEL, NOTABLE, fewer_stars, held_out
 from photogram.stellar.identification import STARS_OF_AN_ATTITUDE, attitude_radius, identify, identify_again
 from photogram.stellar.matching import ACCEPTED, CERTAIN, DOUBTFUL, LOG_ODDS, STRETCH, Match
 from photogram.stellar.night_result import Night
@@ -176,12 +176,12 @@ class Run:
         images, matched = np.array([(len(seen.kept), seen.count) for seen in unnamed]).reshape(-1, 2).T
         if poor := fewer_stars(images, matched):
             return unnamed[poor[0]].index, _counted("stars.few-matches", unnamed[poor[0]])
-        tests = held_out(self.exposures(), self.found, night)
-        unlike = [(test.factor, k) for k, test in enumerate(tests) if test.unlike(len(tests))]
-        if not unlike:
+        factors, probabilities = held_out(self.exposures(), self.found, night)
+        unlike = (factors > NOTABLE) & (probabilities < LEVEL / len(factors))
+        if not unlike.any():
             return None
-        factor, k = max(unlike)
-        return self.seen[k].index, phrase("stars.unlike", factor=factor)
+        k = int(np.where(unlike, factors, 0.0).argmax())
+        return self.seen[k].index, phrase("stars.unlike", factor=float(factors[k]))
 
     def identify_rejected(self) -> bool:
         """Identify rejected exposures with the calibrated camera; return success."""
