@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -296,7 +297,7 @@ class _Mistake:
     angles: Callable[[float, float, float], tuple[float, float, float]] | None = (
         None  # Azimuth, elevation, roll
     )
-    site: Mapping[str, float] = field(default_factory=dict)
+    site: Mapping[str, Any] = field(default_factory=dict)
     scale: float = 1.0  # Of the principal distance
 
     def match(self, exposure: Exposure, night: Night) -> tuple[Match, float]:

@@ -219,7 +219,8 @@ def _places(places: Floats) -> list[Quantity]:
 
 def fictitious(result: Result) -> Table:
     """Return directions of plate points for every attitude, with orientation ellipses."""
-    groups, places, horizontal, covariances = (), np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, 2))
+    groups: Sequence[str] = ()
+    places, horizontal, covariances = np.zeros((0, 2)), np.zeros((0, 2)), np.zeros((0, 2, 2))
     if (found := result.movement) is not None:
         groups = np.repeat(found.groups, len(DIAGONAL)).tolist()
         places, horizontal = found.places.reshape(-1, 2), found.horizontal.reshape(-1, 2)
