@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram.stellar.matching import ACCEPTED, Search, chance, expected_false, match
+from photogram.stellar.matching import ACCEPTED, Search, expected_false, match
 
 NIGHTS = runpy.run_path(str(Path(__file__).parents[2] / "benches" / "star_nights.py"))
 FRAME = (6000.0, 4000.0)
@@ -30,16 +30,16 @@ FRAME = (6000.0, 4000.0)
     ],
 )
 def test_the_golden_odds(images, fixing, mu, matched, hypotheses, probability, accepted):
-    assert chance(images, fixing, mu, matched) == pytest.approx(probability, rel=1e-9)
+    assert expected_false(images, fixing, mu, matched) == pytest.approx(probability, rel=1e-9)
     assert (expected_false(images, fixing, mu, matched, hypotheses) < ACCEPTED) == accepted
 
 
 def test_odds_at_their_limits():
-    assert chance(10, 2, 0.1, 2) == 1.0
-    assert chance(10, 2, 0.0, 3) == 0.0
-    assert chance(10, 2, 0.1, 11) == 0.0
+    assert expected_false(10, 2, 0.1, 2) == 1.0
+    assert expected_false(10, 2, 0.0, 3) == 0.0
+    assert expected_false(10, 2, 0.1, 11) == 0.0
     # Fewer than the smallest number that is not zero.
-    assert 0 <= chance(5000, 2, 1e-6, 5000) < 1e-300
+    assert 0 <= expected_false(5000, 2, 1e-6, 5000) < 1e-300
 
 
 def test_fields_of_no_star_in_common_are_not_matched():

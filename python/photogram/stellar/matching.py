@@ -230,16 +230,6 @@ _REACH = 6.0  # reach of a second star, in standard deviations
 CROWDED = 0.3  # Largest number of catalogue stars in a tolerance area that permits counting
 
 
-def chance(images: int, fixing: int, mu: float, matched: int) -> float:
-    """Return the probability that a wrong hypothesis matches `matched` images or more.
-
-    Matches are one to one, `fixing` images define the hypothesis, and mu is the mean number of catalogue
-    stars in a tolerance area.
-    """
-    trials, least = images - fixing, matched - fixing
-    return binomial_tail(trials, -math.expm1(-mu), least)
-
-
 def binomial_tail(trials: int, probability: float, least: int) -> float:
     """Return the binomial probability of at least `least` successes, a probability of F."""
     if least <= 0 or probability >= 1:
@@ -251,9 +241,13 @@ def binomial_tail(trials: int, probability: float, least: int) -> float:
     return _photocore.fisher(ratio, 2.0 * failures, 2.0 * least)
 
 
-def expected_false(images: int, fixing: int, mu: float, matched: int, hypotheses: float) -> float:
-    """Return the expected number of wrong hypotheses with an equal match: E = T P."""
-    return hypotheses * chance(images, fixing, mu, matched)
+def expected_false(images: int, fixing: int, mu: float, matched: int, hypotheses: float = 1.0) -> float:
+    """Return the expected number of wrong hypotheses that match `matched` images or more: E = T P.
+
+    Matches are one to one, `fixing` images define a hypothesis, and mu is the mean number of catalogue stars
+    in a tolerance area.
+    """
+    return hypotheses * binomial_tail(images - fixing, -math.expm1(-mu), matched - fixing)
 
 
 def _normal(off: Floats, sd: float) -> Floats:

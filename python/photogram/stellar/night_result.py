@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.fields import check_fields, option
-from photogram.arguments.objects import require
+from photogram.arguments.objects import require, require_name
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
@@ -23,7 +23,7 @@ from photogram.stellar.matching import STRETCH
 from photogram.stellar.places import Earth, inertial_attitudes
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration
-from photogram.stellar.sky_cameras import SkyCamera, lens_named
+from photogram.stellar.sky_cameras import LENSES, SkyCamera
 from photogram.summaries import Brief
 from photogram.words import Phrase, phrase
 
@@ -119,7 +119,7 @@ class Night(Brief):
         field_error = self.field_error
         require(0 < field_error <= 0.5, "field_error", "range", low=0, high=0.5, value=field_error)
         for lens in self.lenses:
-            lens_named(lens)
+            require_name("lens", lens, LENSES)
         for name in self.confirmed:
             if name not in self.names:
                 unknown = unknown_name("exposure", name, self.names)

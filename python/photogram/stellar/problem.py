@@ -8,11 +8,10 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.fields import Checked, array, check_arrays, check_fields
-from photogram.arguments.objects import require
+from photogram.arguments.objects import require, require_name
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError, failure_of_core
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.messages import unknown_name
 from photogram.stellar.options import Options
 from photogram.stellar.parameters import COMMON, INDEX, NAMES
 from photogram.stellar.sky import TAU, Site
@@ -338,8 +337,8 @@ def rejected(problem: Problem, stars: Collection[str], points: Collection[str]) 
         ("star", stars, problem.star_ids),
         ("plate point", points, problem.image_points),
     ):
-        if missing := sorted(set(names) - set(known)):
-            raise InputError(unknown_name(kind, missing[0], known))
+        for name in sorted(names):
+            require_name(kind, name, known)
     if not stars and not points:
         return problem
     left = problem.without(

@@ -15,12 +15,11 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.arrays import LARGEST_SD, shaped, truth_value
 from photogram.arguments.fields import Checked
-from photogram.arguments.objects import require
+from photogram.arguments.objects import require, require_name
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import available_memory
-from photogram.messages import unknown_name
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.options import core_threads
 from photogram.stellar.parameters import COMMON
@@ -161,8 +160,8 @@ def calibrate_exposures(
     truth_value("common_scale", common_scale)
     truth_value("weigh_stars", weigh_stars)
     processors = core_threads(threads)
-    for name in sorted(set(fixed) - set(camera.names)):
-        raise InputError(unknown_name("camera parameter", name, camera.names))
+    for name in sorted(fixed):
+        require_name("camera parameter", name, camera.names)
     if not exposures:
         raise InputError(phrase("error.missing", name="exposures"))
     require(0 < pixel_sd < LARGEST_SD, "pixel_sd", "range", low=0, high=LARGEST_SD, value=pixel_sd)

@@ -13,14 +13,13 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.arrays import argument_error, one_of, truth_value
 from photogram.arguments.fields import check_fields
-from photogram.arguments.objects import path_of
+from photogram.arguments.objects import path_of, require_name
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io.json import read_json, to_json
 from photogram.io.tree import Tree
 from photogram.io.yaml_text import camera_info, matrix_lines, read_yaml_text
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import unknown_name
 from photogram.network.cameras import Camera, parameter_names
 from photogram.stellar.parameters import COMMON, INTERIOR
 from photogram.stellar.sky import TAU
@@ -78,16 +77,6 @@ LENSES: dict[str, Lens] = {
     ),
 }
 """Lenses by name in files and reports."""
-
-
-def lens_named(name: str) -> Lens:
-    """Return a lens.
-
-    InputError: if the name is unknown.
-    """
-    if name not in LENSES:
-        raise InputError(unknown_name("lens", name, LENSES))
-    return LENSES[name]
 
 
 def weight_of(covariance: Floats) -> Floats:
@@ -163,7 +152,8 @@ class SkyCamera:
 
     def __post_init__(self) -> None:
         check_fields(self)
-        count = len(lens_named(self.lens).names)
+        require_name("lens", self.lens, LENSES)
+        count = len(self.names)
         if np.shape(self.values) != (count,) or np.shape(self.covariance) != (count, count):
             shapes = {"values": np.shape(self.values), "covariance": np.shape(self.covariance)}
             fields = {name: str(shape) for name, shape in shapes.items()}
@@ -178,7 +168,8 @@ class SkyCamera:
         InputError
             If the lens is unknown, or does not reach the field of view.
         """
-        facts = lens_named(lens)
+        require_name("lens", lens, LENSES)
+        facts = LENSES[lens]
         if not 0 < field_of_view < facts.widest:
             field, widest = math.degrees(field_of_view), math.degrees(facts.widest)
             raise InputError(phrase("stars.field-of-view", field=field, lens=lens, widest=widest))
