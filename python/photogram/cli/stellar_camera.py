@@ -92,7 +92,8 @@ def exposures(
     """Calibrate a digital camera, also an all-sky camera, by exposures of the stars (needs pyerfa)."""
     from photogram.io.places import Place, at_place
     from photogram.stellar.night_calibration import calibrate_night
-    from photogram.stellar.night_file import inputs, read_night
+    from photogram.stellar.night_file import read_night
+    from photogram.stellar.tomlfile import inputs
 
     job.reads(*inputs(night))
     documents = replace(documents, out=documents.out or Path(f"{night.stem}-calibrated"))
@@ -161,7 +162,8 @@ def places(
 def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
     """Return the problems, and the files that they are read from."""
     from photogram.stellar.deck import read_deck
-    from photogram.stellar.plain import inputs, read_plain
+    from photogram.stellar.plain import read_plain
+    from photogram.stellar.tomlfile import inputs
 
     return ([read_plain(deck)], inputs(deck)) if deck.suffix.lower() == ".toml" else (read_deck(deck), [deck])
 

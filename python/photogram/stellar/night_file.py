@@ -27,7 +27,7 @@ from photogram.stellar.places import Earth, attitude_of, axis_of, epoch, pointin
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure
 from photogram.stellar.sky_cameras import LENSES, SkyCamera, read_yaml
-from photogram.stellar.tomlfile import effects, named_files, pole_arcsec, site
+from photogram.stellar.tomlfile import effects, pole_arcsec, site
 from photogram.words import phrase
 
 AUTO = "auto"  # Lens name for an automatic choice
@@ -68,7 +68,6 @@ _TABLES = {
 }
 
 
-_FILES = (("images", "file"), ("catalogue", "file"), ("camera", "start"), ("camera", "prior"))
 _FIRST_PIXELS = {"x_px": 0.5, "xcentroid": 0.0, "x_centroid": 0.0, "x_image": 1.0, "xwin_image": 1.0}
 """Coordinate of the centre of the first pixel by column heading."""
 _ALIASES = {
@@ -109,11 +108,6 @@ def read_night(path: Path, values: Mapping[str, Mapping[str, Any]] | None = None
         document.table(name).only(known)
     with at_place(Place(path)):
         return _night(document)
-
-
-def inputs(path: Path) -> list[Path]:
-    """Return the input files of a night."""
-    return named_files(path, _TABLES, _FILES, several="exposures")
 
 
 def _night(document: TomlTree) -> Night:

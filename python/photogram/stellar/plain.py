@@ -26,7 +26,7 @@ from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.places import sidereal_time
 from photogram.stellar.problem import Axis, Problem, default_parameters, rejected
 from photogram.stellar.sky import HOUR, Site, landmark
-from photogram.stellar.tomlfile import effects, named_files, pole_arcsec, site
+from photogram.stellar.tomlfile import effects, pole_arcsec, site
 from photogram.words import phrase
 
 _READERS: dict[type, Callable[[TomlTree], Any]] = {
@@ -74,11 +74,6 @@ def read_plain(path: Path) -> Problem:
     document = read_document(path, _TABLES)
     with at_place(Place(path)):
         return _problem(document)
-
-
-def inputs(path: Path) -> list[Path]:
-    """Return the input files of a calibration."""
-    return named_files(path, _TABLES, (("stars", "file"), ("images", "file"), ("camera", "prior")))
 
 
 def _problem(document: TomlTree) -> Problem:

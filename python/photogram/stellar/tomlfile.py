@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 
 from photogram.io.angles import ARCSEC
 from photogram.io.places import at_place
-from photogram.io.toml import TomlTree, read_document
+from photogram.io.toml import TomlTree, read_toml
 from photogram.stellar.sky import ABERRATION, HECTOPASCAL, Air, Effects, Site
 
 _STATION = {
@@ -26,16 +25,11 @@ _STATION = {
 }
 
 
-def named_files(
-    path: Path,
-    tables: Mapping[str, Sequence[str] | None],
-    keys: Sequence[tuple[str, str]],
-    several: str = "",
-) -> list[Path]:
-    """Return a file and the files named in its tables, which results must not replace."""
-    document = read_document(path, tables, several=several)
-    named = [(document.table(table), key) for table, key in keys]
-    return [path, *(table[key].named_file() for table, key in named if key in table)]
+def inputs(path: Path) -> list[Path]:
+    """Return a file of a plate or night, and the files that it names: results must not replace them."""
+    tables = [table for _, table in read_toml(path).items() if isinstance(table.value, dict)]
+    keys = ("file", "prior", "start")
+    return [path, *(table[key].named_file() for table in tables for key in keys if key in table)]
 
 
 def effects(table: TomlTree) -> Effects:
