@@ -54,9 +54,11 @@ mod parallel;
 /// Functions that other crates of this project use; they may change at any time.
 #[doc(hidden)]
 pub mod internal {
-    pub use crate::adjustment::{go_on, median};
+    pub use crate::adjustment::{
+        ObservationEquations, Reweighting, Transformation, between, go_on, median, moved,
+    };
     pub use crate::geometry::principal_axes;
-    pub use crate::network::meet;
+    pub use crate::network::{Assembled, Selected, meet};
     pub use crate::parallel::map;
 }
 

@@ -6,15 +6,14 @@ use std::ops::ControlFlow;
 
 use photocore::Threads;
 use photocore::adjustment::Event;
-use photocore::geometry::{
-    self, Air, ObjectSpace, Perspective, PoseNumbers, RotationSense, Station as Site, Vector3,
-};
+use photocore::geometry::{self, ObjectSpace, Perspective, PoseNumbers, RotationSense, Vector3};
 use photocore::network::{Camera, Image, Network, Of, Options, Photo, Point};
 use photogram_programs::comparator::{
     Basis, Calibration as Comparison, Case, Comparator, GridPoint, Measurement, Placement,
 };
 use photogram_programs::resection::{ControlPoint, Known, Partials, Resection};
 use photogram_programs::similarity::{self, Station};
+use photogram_programs::sky::{self, Air, Station as Site};
 use photogram_programs::stellar::{self, COMMON, Decentering, Form, Kind, Star, Tolerances, Weights};
 
 const SPACE: ObjectSpace = ObjectSpace::Rectangular;
@@ -157,7 +156,7 @@ fn calibrate_on_stars(threads: &Threads) {
         Kind { lens: None, form: Form::ScaleFirst, decentering: Decentering::Polar, common_scale: false };
     let mut common = [0.0; COMMON];
     common[3..5].copy_from_slice(&[0.3, 0.3]);
-    common[13..].copy_from_slice(&geometry::sky::REFRACTION);
+    common[13..].copy_from_slice(&sky::REFRACTION);
     let image = |i: usize| stellar::Image {
         star: i,
         pointing: 0,

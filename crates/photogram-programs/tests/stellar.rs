@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 use num_complex::Complex64;
-use photocore::geometry::sky::{ARCSEC, REFRACTION};
-use photocore::geometry::{Air, Distortion, Station, pointing, pointing_angles};
+use photocore::geometry::Distortion;
+use photogram_programs::sky::{ARCSEC, Air, REFRACTION, Station, pointing, pointing_angles};
 use photogram_programs::stellar::{
     Attitude, COMMON, Calibration, Camera, Decentering, Form, Image, Kind, Star, Weights,
 };

@@ -8,8 +8,7 @@ use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
 use photocore::Threads;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Status, Stop};
-use photocore::geometry::sky::{ARCSEC, REFRACTION};
-use photocore::geometry::{Air, Station};
+use photogram_programs::sky::{ARCSEC, Air, REFRACTION, Station};
 use photogram_programs::stellar::{
     Axis, COMMON, Calibration, Decentering, Form, Image, Kind, Options, Rows, Solution, Star, StellarError,
     Weights,

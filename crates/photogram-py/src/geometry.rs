@@ -9,9 +9,10 @@ use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use photocore::geometry::angle_axis::rotation_angle_axis;
 use photocore::geometry::{
     self, AirModel, Ellipsoid, GeometryError, Lift, ObjectSpace, Point, Refraction, RotationSense, Vector3,
-    View, Water, WaterModel, nearest,
+    View, Water, WaterModel,
 };
 use photogram_programs::features::{Form, Measured, distance, measure};
+use photogram_programs::nearest::nearest;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 

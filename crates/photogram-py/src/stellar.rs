@@ -4,7 +4,8 @@ use nalgebra::Complex;
 use numpy::{PyArray1, PyArrayMethods};
 use photocore::Threads;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop, Watch};
-use photocore::geometry::{Air, Camera as Lens, Station, pointing, pointing_angles};
+use photocore::geometry::Camera as Lens;
+use photogram_programs::sky::{Air, Station, pointing, pointing_angles};
 use photogram_programs::stellar::{
     Agreement, Attitude, Axis, COMMON, Calibration, Camera, Decentering, Form, INTERIOR, Image, Kind,
     Observations, Options, Rows, Similarity, Star, StellarError as Failure, Tested, Tolerances, Weights,

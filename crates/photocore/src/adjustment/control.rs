@@ -49,7 +49,7 @@ fn by_gain(gain: f64) -> f64 {
     (1.0 - (2.0 * gain - 1.0).powi(3)).max(1.0 / 3.0)
 }
 
-/// Returns the constants of the step control by name, for partitioned problems (see [`super::Linearized::of_part`]).
+/// Returns the constants of the step control by name, for partitioned problems (Helmert blocking).
 pub fn step_rules() -> [(&'static str, f64); 8] {
     [
         ("rounding", ROUNDING),

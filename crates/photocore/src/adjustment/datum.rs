@@ -76,59 +76,21 @@ pub struct Adjusted<'a> {
     pub loss: Option<Loss>,
 }
 
-/// Matrices for the datum transformation of a partitioned network: columns over all unknowns, one after the other.
-#[derive(Debug)]
-pub struct DatumColumns {
-    /// The matrix B.
-    pub b: Vec<f64>,
-    /// T = G (B^T G)^-1.
-    pub t: Vec<f64>,
-    /// Condition of B^T G with scaled columns.
-    pub condition: f64,
-    /// Whether the number of carriers equals the number of columns: they are then fixed by the datum.
-    pub exact: bool,
-}
-
-/// Transforms an adjusted network to a datum; also returns the matrices for its cofactors.
-///
-/// # Errors
-/// The network is not free, or the carriers do not separate all null vectors.
-pub fn moved_with_columns(
-    problem: &AnyProblem<'_>,
-    adjusted: Adjusted<'_>,
-    datum: &Datum,
-    reference: &[f64],
-    threads: &Threads,
-) -> Result<(Vec<f64>, DatumColumns), DatumError> {
-    let (unknowns, basis) = moved(problem, adjusted, datum, reference, threads)?;
-    Ok((unknowns, basis.columns()))
-}
-
 /// Rows of B for the carriers, and T = G (B^T G)^-1, with columns such that B without the factors is orthonormal.
 #[derive(Debug, Clone)]
-pub(super) struct Basis {
-    carriers: Vec<usize>,
-    b: Mat<f64>,
+#[doc(hidden)]
+pub struct Basis {
+    pub carriers: Vec<usize>,
+    pub b: Mat<f64>,
     /// One row per unknown.
-    t: Vec<f64>,
+    pub t: Vec<f64>,
     /// Number of columns.
     d: usize,
     /// Condition of B^T G with scaled columns.
-    condition: f64,
+    pub condition: f64,
 }
 
 impl Basis {
-    /// Returns both matrices over all unknowns.
-    fn columns(self) -> DatumColumns {
-        let Self { carriers, b: of_carriers, t, d, condition } = self;
-        let (count, mut b) = (t.len() / d.max(1), vec![0.0; t.len()]);
-        for (row, &carrier) in carriers.iter().enumerate() {
-            (0..d).for_each(|k| b[k * count + carrier] = of_carriers[(row, k)]);
-        }
-        let t = (0..d).flat_map(|k| t.iter().skip(k).step_by(d)).copied().collect();
-        DatumColumns { b, t, condition, exact: carriers.len() == d }
-    }
-
     /// Returns the right-hand sides B over all unknowns, one after the other. They are zero for constrained and fixed unknowns, whose
     /// normal equations have unit weight.
     pub fn rights(&self, problem: &AnyProblem<'_>, held: &[usize]) -> Vec<f64> {
@@ -170,7 +132,8 @@ impl Basis {
 /// Transforms a network as a whole so that its carriers are as near to their references as possible.
 ///
 /// Uses the Gauss-Newton method for the sum of squared distances, with exact motions.
-pub(super) fn moved(
+#[doc(hidden)]
+pub fn moved(
     problem: &AnyProblem<'_>,
     adjusted: Adjusted<'_>,
     datum: &Datum,

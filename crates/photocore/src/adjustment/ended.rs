@@ -92,7 +92,8 @@ impl Adjustment {
     }
 
     /// Sets cofactors and redundancy numbers, and adds the effort of their formation.
-    pub(super) fn put(&mut self, problem: &AnyProblem<'_>, inverted: Inverted) {
+    #[doc(hidden)]
+    pub fn put(&mut self, problem: &AnyProblem<'_>, inverted: Inverted) {
         self.redundancy = Some(inverted.cofactors.equations.iter().map(|share| 1.0 - share).collect());
         self.counts = problem.counts(&inverted.held);
         self.datum = inverted.held;

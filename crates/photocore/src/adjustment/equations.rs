@@ -18,7 +18,8 @@ use crate::{Threads, parallel};
 const PARTS: usize = 16;
 
 /// Equations of a problem at given values: in unit weight, reweighted by a loss, with zero columns for fixed unknowns.
-pub(super) struct ObservationEquations<'a> {
+#[doc(hidden)]
+pub struct ObservationEquations<'a> {
     problem: &'a AnyProblem<'a>,
     at: Box<dyn Evaluated + 'a>,
     /// Standard deviations of the observations; infinite for excluded ones.
@@ -26,13 +27,14 @@ pub(super) struct ObservationEquations<'a> {
     /// Flags of fixed or constrained unknowns; None if all are free.
     fixed: Option<Vec<bool>>,
     reweighting: Option<Reweighting>,
-    /// Contributions of child systems (see [`super::Linearized::of_part`]).
+    /// Contributions of child systems (see [`Layout::as_part`](crate::normals::Layout::as_part)).
     contributions: &'a [Contribution<'a>],
 }
 
 /// Single equation of unit weight.
 #[derive(Debug)]
-pub(super) struct Row<'a> {
+#[doc(hidden)]
+pub struct Row<'a> {
     /// Its index, in the order of groups and rows, then of ties and rows, then of unknowns.
     pub number: usize,
     /// Observed minus computed.

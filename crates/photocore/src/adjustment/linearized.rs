@@ -23,13 +23,17 @@ pub struct Linearized {
     pub(super) values: Vec<f64>,
     pub(super) held: Vec<usize>,
     pub(super) reweighting: Option<Reweighting>,
-    pub(super) prior: Prior,
-    pub(super) factor: Factor,
-    pub(super) sum_of_squares: f64,
+    #[doc(hidden)]
+    pub prior: Prior,
+    #[doc(hidden)]
+    pub factor: Factor,
+    #[doc(hidden)]
+    pub sum_of_squares: f64,
     /// Datum for the cofactors.
     pub(super) basis: Option<Basis>,
     /// Transformation of cofactors to this datum.
-    pub(super) transformation: Option<Transformation>,
+    #[doc(hidden)]
+    pub transformation: Option<Transformation>,
     /// Computing time so far.
     pub(super) seconds: Seconds,
 }
@@ -38,13 +42,16 @@ pub struct Linearized {
 #[derive(Debug)]
 pub struct Inverted {
     /// Linearization point.
-    pub(super) values: Vec<f64>,
+    #[doc(hidden)]
+    pub values: Vec<f64>,
     /// Constrained unknowns.
-    pub(super) held: Vec<usize>,
+    #[doc(hidden)]
+    pub held: Vec<usize>,
     pub(super) cofactors: Cofactors,
     /// Redundancy numbers of the unknowns as observations of themselves (zero unless weighted).
     pub(super) prior_redundancy: Vec<f64>,
-    pub(super) selected: SelectedInverse,
+    #[doc(hidden)]
+    pub selected: SelectedInverse,
     /// Approximate relative rounding error of variances that were transformed to another datum. Large numbers cancel if the two datums are
     /// distant, or if a datum is weak.
     pub lost: Option<f64>,
@@ -90,7 +97,8 @@ impl Linearized {
     }
 
     /// Forms and factors given observation equations.
-    pub(super) fn of(
+    #[doc(hidden)]
+    pub fn of(
         equations: &ObservationEquations<'_>,
         values: Vec<f64>,
         held: Vec<usize>,
@@ -169,7 +177,8 @@ impl Linearized {
     }
 
     /// Whether the second-order term of a loss is used.
-    pub(super) fn is_curved(&self) -> bool {
+    #[doc(hidden)]
+    pub fn is_curved(&self) -> bool {
         self.reweighting.is_some_and(|reweighting| reweighting.curved)
     }
 
@@ -215,7 +224,8 @@ impl Linearized {
     }
 
     /// Whether an unknown is neither fixed nor constrained.
-    pub(super) fn is_free(&self, problem: &AnyProblem<'_>, unknown: usize) -> bool {
+    #[doc(hidden)]
+    pub fn is_free(&self, problem: &AnyProblem<'_>, unknown: usize) -> bool {
         problem.sd[unknown] != 0.0 && !self.held.contains(&unknown)
     }
 
@@ -344,7 +354,8 @@ impl Linearized {
     }
 
     /// Computes the step of all unknowns, or solves for the right-hand sides in the options.
-    pub(super) fn solve(
+    #[doc(hidden)]
+    pub fn solve(
         &self,
         equations: &ObservationEquations<'_>,
         options: &SolveOptions<'_>,
@@ -356,7 +367,8 @@ impl Linearized {
     }
 
     /// Computes the selected inverse in the requested datum.
-    pub(super) fn invert(
+    #[doc(hidden)]
+    pub fn invert(
         self,
         equations: &ObservationEquations<'_>,
         options: &InvertOptions<'_>,
@@ -393,11 +405,8 @@ impl Linearized {
     }
 
     /// Returns the observation equations again, reweighted by the loss: one pass over the unknowns instead of storage.
-    pub(super) fn equations<'a>(
-        &self,
-        problem: &'a AnyProblem<'a>,
-        threads: &Threads,
-    ) -> ObservationEquations<'a> {
+    #[doc(hidden)]
+    pub fn equations<'a>(&self, problem: &'a AnyProblem<'a>, threads: &Threads) -> ObservationEquations<'a> {
         ObservationEquations::new(problem, self.reweighting, &self.values, &self.held, threads)
     }
 

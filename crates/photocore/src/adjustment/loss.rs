@@ -54,7 +54,8 @@ const LEAST_CURVATURE: f64 = 1e-3;
 
 /// Reweighting of the equations of a group.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Reweighting {
+#[doc(hidden)]
+pub struct Reweighting {
     pub loss: Loss,
     /// Whether the second-order term is used.
     pub curved: bool,

@@ -76,7 +76,6 @@ mod motions;
 mod noncentral;
 mod observation_rows;
 mod options;
-mod part;
 mod problem;
 mod result;
 mod run;
@@ -92,29 +91,33 @@ mod walk;
 pub use additional::{Additional, AdditionalParameters, Equation, EquationOf, Shared};
 pub use alone::Alone;
 pub use control::step_rules;
-pub use datum::{Adjusted, Datum, DatumColumns, DatumError, moved_with_columns};
+#[doc(hidden)]
+pub use datum::moved;
+pub use datum::{Adjusted, Datum, DatumError};
 pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, normal, student,
     student_limit,
 };
+#[doc(hidden)]
+pub use equations::ObservationEquations;
 pub use group_test::{Few, GroupTest, VISIBLE, correlation_above, leverage_odds, may_correlate, whitening};
 pub use leverages::Leverages;
 pub use linearized::{CofactorError, Inverted, Linearized};
 pub use loss::Loss;
+#[doc(hidden)]
+pub use loss::Reweighting;
 pub use motions::Classes;
 pub use noncentral::{
     detectable_noncentrality, level_of_equal_power, noncentral_chi_square, noncentral_fisher,
 };
 pub use observation_rows::ObservationRows;
 pub use options::{Event, History, Iteration, Method, Options, Phase, Published, Status, Stop};
-pub use part::{PartError, PartOptions};
 pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem, Term};
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Effort, Seconds};
-pub(crate) use run::between;
-#[doc(hidden)]
-pub use run::go_on;
 pub use run::{Requests, Watch, adjust, adjust_with};
+#[doc(hidden)]
+pub use run::{between, go_on};
 pub use score_parts::{Groups, ScoreParts};
 #[doc(hidden)]
 pub use statistics::median;
@@ -122,4 +125,5 @@ pub use statistics::{Counts, Observed, leading_matrix, standardized};
 pub(crate) use statistics::{middle, weighted};
 pub use terms::Terms;
 pub use traces::{EquationGroups, GroupSquares, Probing};
-pub use transformation::DatumOfPart;
+#[doc(hidden)]
+pub use transformation::Transformation;

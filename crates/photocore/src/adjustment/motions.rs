@@ -224,7 +224,8 @@ impl AnyProblem<'_> {
     }
 
     /// Returns the unknowns to constrain at given values; empty if a datum is defined.
-    pub(crate) fn to_hold(&self, values: &[f64], threads: &Threads) -> Vec<usize> {
+    #[doc(hidden)]
+    pub fn to_hold(&self, values: &[f64], threads: &Threads) -> Vec<usize> {
         let motions = threads.install(|| self.model.motions(values));
         let open = motions.and_then(|motions| self.open(values, &motions, 0, threads));
         open.map_or(vec![], |open| open.hold)

@@ -434,7 +434,7 @@ impl<'a> Run<'a, '_> {
 }
 
 /// Reports finished local blocks.
-pub(crate) fn between(
+pub fn between(
     watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
     phase: Phase,
     total: usize,

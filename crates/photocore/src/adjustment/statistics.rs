@@ -133,7 +133,8 @@ impl AnyProblem<'_> {
     }
 
     /// Returns the residuals of an evaluated model.
-    pub(super) fn residuals_at(&self, threads: &Threads, at: &dyn Evaluated) -> Vec<f64> {
+    #[doc(hidden)]
+    pub fn residuals_at(&self, threads: &Threads, at: &dyn Evaluated) -> Vec<f64> {
         let layout = self.layout();
         let rows = layout.rows();
         let by_stretch = self.for_locals(threads, |buffers, locals| {

@@ -98,7 +98,8 @@ impl AnyProblem<'_> {
 
     /// Forms the normal equations of all terms. A fixed or constrained unknown has the equation x = 0 with unit weight instead of others
     /// (see [`super::equations`]). Outer unknowns have zero weight here.
-    pub(super) fn prior_equations(&self, terms: &Terms<'_>, held: &[usize]) -> Prior {
+    #[doc(hidden)]
+    pub fn prior_equations(&self, terms: &Terms<'_>, held: &[usize]) -> Prior {
         let fixed = self.fixed(held);
         let weight = fixed.iter().map(|&fixed| f64::from(u8::from(fixed))).collect();
         let mut prior = Prior { weight, right: vec![0.0; fixed.len()], between: vec![] };

@@ -17,7 +17,8 @@ type Along = SmallVec<[f64; 8]>;
 /// T = G (B^T G)^-1, W = Q B and B^T W, which transform any block of Q to the other datum: Q_ij - T_i W_j^T - W_i T_j^T + T_i (B^T W)
 /// T_j^T.
 #[derive(Debug, Clone)]
-pub(super) struct Transformation {
+#[doc(hidden)]
+pub struct Transformation {
     /// T and W: one row per unknown, one after the other.
     pub t: Vec<f64>,
     pub w: Vec<f64>,
@@ -28,24 +29,6 @@ pub(super) struct Transformation {
     pub staying: Vec<usize>,
 }
 
-/// Matrices for the transformation of a part's cofactors to a datum of the whole (see `datum.rs`). They have columns over the unknowns of
-/// the part, including outer ones, one after the other.
-#[derive(Debug, Clone, Copy)]
-pub struct DatumOfPart<'a> {
-    /// T, as in [`super::DatumColumns`].
-    pub t: &'a [f64],
-    /// W = Q B.
-    pub w: &'a [f64],
-    /// B^T W of the whole, row by row.
-    pub common: &'a [f64],
-    /// Last step, before the transformation to the datum.
-    pub last: &'a [f64],
-    /// Condition of B^T G of the whole.
-    pub condition: f64,
-    /// Unknowns that are fixed by the new datum, ascending.
-    pub staying: &'a [usize],
-}
-
 /// Cofactors of one block, with its unknowns.
 struct Block<'a> {
     rows: Range<usize>,
@@ -54,21 +37,6 @@ struct Block<'a> {
 }
 
 impl Transformation {
-    /// Creates the transformation of a part from matrices of the whole (see [`DatumOfPart`]).
-    pub fn of_part(datum: &DatumOfPart<'_>, unknowns: usize) -> Self {
-        let d = datum.t.len() / unknowns.max(1);
-        let by_rows = |columns: &[f64]| {
-            (0..unknowns).flat_map(|unknown| (0..d).map(move |k| columns[k * unknowns + unknown])).collect()
-        };
-        Self {
-            t: by_rows(datum.t),
-            w: by_rows(datum.w),
-            common: Mat::from_fn(d, d, |i, j| datum.common[i * d + j]),
-            condition: datum.condition,
-            staying: datum.staying.to_vec(),
-        }
-    }
-
     /// Whether an unknown is fixed by the new datum.
     pub fn stays(&self, unknown: usize) -> bool {
         self.staying.binary_search(&unknown).is_ok()

@@ -8,12 +8,13 @@ use crate::{Threads, parallel};
 
 /// Buffers for the rows of one group, and of one tie.
 #[derive(Default)]
-pub(super) struct Buffers {
+#[doc(hidden)]
+pub struct Buffers {
     constant: Vec<f64>,
     local: Vec<f64>,
     retained: Vec<f64>,
     shared: Vec<f64>,
-    pub tie: TieBuffer,
+    pub(super) tie: TieBuffer,
     /// Buffer for the unknowns of these rows.
     pub columns: Vec<usize>,
 }

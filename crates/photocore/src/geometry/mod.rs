@@ -9,9 +9,7 @@
 //! * [`mod@film`]: deformation and scanning of film; [`mod@correction`]: readings of comparators and scanners;
 //! * [`lens`]: radial and decentering distortion, forward and inverse;
 //! * [`plate_lens`]: the lens of a star plate;
-//! * [`sky`]: apparent places of stars, diurnal aberration, refraction, standard coordinates, attitudes of stellar cameras;
 //! * [`refraction`]: displacement of points by air and water; [`atmosphere`]: the standard atmosphere;
-//! * [`mod@nearest`]: nearest neighbours in a plane;
 //! * [`mod@trajectory`]: poses as functions of time.
 //!
 //! Vectors and matrices in cartesian axes are `nalgebra` types. Three numbers of different units or meanings (coordinates of the object
@@ -38,14 +36,12 @@ pub mod correction;
 pub mod ellipsoid;
 pub mod film;
 pub mod lens;
-pub mod nearest;
 pub mod orientation;
 pub mod plate_lens;
 pub mod pose;
 pub mod projection;
 pub mod refraction;
 pub mod rotation;
-pub mod sky;
 pub mod space;
 pub mod trajectory;
 
@@ -54,7 +50,6 @@ pub use attitude::{AttitudeNumbers, RotationSense};
 pub use camera::{Bal, Brown, Camera, CameraModel, Image, Perspective, Unit};
 pub use ellipsoid::{Ellipsoid, GeometryError, local_vertical};
 pub use lens::{Displacement, Distortion, Undistorted};
-pub use nearest::nearest;
 pub use orientation::{Orientation, PoseNumbers};
 pub use plate_lens::{PlateLens, Plated};
 pub use pose::{POSE, Pose, Steps};
@@ -63,5 +58,4 @@ pub use refraction::{AirModel, Refraction, Vertical, Water, WaterModel};
 #[doc(hidden)]
 pub use rotation::principal_axes;
 pub use rotation::{Matrix3, Vector3, nearest_turns, rotation, rotation_angles, rotation_with_partials};
-pub use sky::{Air, Standard, Station, pointing, pointing_angles, pointing_with_partials};
 pub use space::{Lift, ObjectSpace, Point};

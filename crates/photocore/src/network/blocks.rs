@@ -84,7 +84,8 @@ impl Network {
     ///
     /// Coefficients with global support of one trajectory share a block, because every image of it depends on all of them. So do parameters
     /// of the same corrections, which are in the block of a photo if only its images depend on them.
-    pub(super) fn commons_by_block(&self, elsewhere: &BTreeSet<usize>) -> (Vec<Vec<usize>>, Vec<Vec<usize>>) {
+    #[doc(hidden)]
+    pub fn commons_by_block(&self, elsewhere: &BTreeSet<usize>) -> (Vec<Vec<usize>>, Vec<Vec<usize>>) {
         let mut leader: Vec<usize> = (0..self.commons.len()).collect();
         let mut uses = vec![0; self.commons.len()];
         self.trajectories.iter().flat_map(Trajectory::everywhere).for_each(|common| uses[common] += 1);

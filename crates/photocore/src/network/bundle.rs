@@ -120,7 +120,8 @@ impl Network {
     }
 
     /// Returns true if the network defines its datum.
-    pub(super) fn is_placed(&self, selected: &Selected) -> bool {
+    #[doc(hidden)]
+    pub fn is_placed(&self, selected: &Selected) -> bool {
         self.given_datum(selected, &self.placed_mounts([0.0; 3])).placed
     }
 

@@ -8,11 +8,11 @@ use super::input::{Image, Network};
 use super::mounts::{AT_PHOTO, Mount, Mounts, Trajectory};
 use super::observations::{Fault, Observation};
 use super::passages::{Passage, Requirements};
-use super::surroundings::{BlockOf, Surroundings};
 use crate::geometry::{ObjectSpace, PoseNumbers};
 
 impl Network {
-    pub(super) fn check(&self) -> Result<(), NetworkError> {
+    #[doc(hidden)]
+    pub fn check(&self) -> Result<(), NetworkError> {
         let counts = (self.photos.len(), self.points.len());
         let outside = |image: &Image| image.photo >= counts.0 || image.point >= counts.1;
         if let Some(bad) = self.images.iter().position(outside) {
@@ -152,23 +152,6 @@ impl Network {
         let mut images = self.images.iter().zip(&self.image_times);
         images.try_for_each(|(image, &at)| reach(image.photo, Some(image.point), at))?;
         (0..self.photos.len()).try_for_each(|photo| reach(photo, None, AT_PHOTO))
-    }
-
-    /// Returns an error for indices of missing blocks.
-    pub(super) fn check_blocks(&self, surroundings: &Surroundings) -> Result<(), NetworkError> {
-        let there = |block: BlockOf| match block {
-            BlockOf::Photo(photo) => photo < self.photos.len(),
-            BlockOf::Camera(camera) => camera < self.cameras.len(),
-            BlockOf::Common(common) => common < self.commons.len(),
-            BlockOf::Point(point) => point < self.points.len(),
-        };
-        let held = surroundings.held.iter();
-        if held.clone().any(|&(_, number)| number >= 6) {
-            return Err(NetworkError::Node("a photo has six unknowns that may be held"));
-        }
-        let mut all = surroundings.all().chain(held.map(|&(photo, _)| BlockOf::Photo(photo)));
-        let missing = all.find(|&block| !there(block));
-        missing.map_or(Ok(()), |block| Err(NetworkError::NoBlock(block)))
     }
 }
 

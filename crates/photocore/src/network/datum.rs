@@ -13,7 +13,8 @@ use crate::geometry::{Point, PoseNumbers, Vector3};
 
 impl Network {
     /// Returns an error for photos that cannot define a datum.
-    pub(super) fn check_carriers(
+    #[doc(hidden)]
+    pub fn check_carriers(
         &self,
         inner: &InnerConstraints,
         assembled: &Assembled,
@@ -28,7 +29,8 @@ impl Network {
 
 impl Assembled {
     /// Returns the datum parameters and their reference values.
-    pub(super) fn datum(&self, inner: &InnerConstraints) -> (Datum, Vec<f64>) {
+    #[doc(hidden)]
+    pub fn datum(&self, inner: &InnerConstraints) -> (Datum, Vec<f64>) {
         let model = &self.problem.model;
         let mut reference = self.problem.initial.clone();
         for (point, given) in model.points.iter().enumerate() {

@@ -10,7 +10,6 @@
 //!
 //! | part | files and folders |
 //! | --- | --- |
-//! | nodes | `node_datum`, `node` |
 //! | tests of observations | `snooping`, `hypotheses`, `responses`, `predictions`, `group_tests` |
 //! | adjustment | `adjust` |
 //! | results | `groups`, `covariance`, `solution`, `visibility`, `weak_points`, `adjusted` |
@@ -83,8 +82,6 @@ mod motions;
 pub mod mounts;
 mod naming;
 mod neighbourhood;
-mod node;
-mod node_datum;
 pub mod observations;
 pub mod passages;
 mod passing;
@@ -120,12 +117,14 @@ pub use input::{
 #[doc(hidden)]
 pub use intersection::meet;
 pub use mounts::{Mount, Trajectory};
-pub use node::{FormedNode, Node, NodePrediction};
-pub use node_datum::{AdjustedInParts, UnknownName};
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use passages::Passage;
 pub use predictions::{OnPoint, Prediction};
+#[doc(hidden)]
+pub use problem::Assembled;
 pub use responses::Moved;
+#[doc(hidden)]
+pub use selection::Selected;
 pub use selection::{Dropped, Reason};
 pub use solution::{DatumInForce, Joint, LEAST_REDUNDANCY, Solution, SumsByType, Weak};
 pub use surroundings::{BlockOf, Surroundings};

@@ -15,7 +15,8 @@ const NOTABLE: f64 = 0.01;
 
 impl NetworkError {
     /// Converts an error of the adjustment to terms of the network.
-    pub(super) fn new(error: AdjustError, assembled: &Assembled) -> Self {
+    #[doc(hidden)]
+    pub fn new(error: AdjustError, assembled: &Assembled) -> Self {
         match error {
             AdjustError::UndeterminedLocals(locals) => {
                 let mut points: Vec<usize> =

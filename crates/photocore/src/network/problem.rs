@@ -4,37 +4,73 @@
 use super::error::NetworkError;
 use super::input::{Image, Network, Options, Point, Start, State};
 use super::layout::layout;
-use super::model::Bundle;
+use super::model::{Bundle, Owner};
 use super::neighbourhood::TOGETHER;
 use super::observations::{Fault, Linear};
 use super::selection::{Dropped, LeftOut, Selected};
 use super::stations::{Station, Stations};
 use super::surroundings::Surroundings;
-use crate::adjustment::median;
-use crate::adjustment::{Method, Problem};
+use crate::adjustment::{AnyProblem, Method, Problem, median};
 use crate::geometry::{ObjectSpace, POSE, PoseNumbers};
 use crate::normals::{Layout, System, TieBuffer, TieRows};
 use crate::{Threads, parallel};
 
 /// A problem, and the indices of its parts in the network.
 #[derive(Debug)]
-pub(super) struct Assembled {
-    pub problem: Problem<Bundle>,
+#[doc(hidden)]
+pub struct Assembled {
+    pub(super) problem: Problem<Bundle>,
     /// Active points, in the order of the model.
     pub points: Vec<usize>,
     /// Excluded points and photos, with reasons.
     pub dropped: Vec<Dropped>,
     /// Photos that are fixed because their images do not determine them.
-    pub loose: Vec<usize>,
+    pub(super) loose: Vec<usize>,
 }
 
 /// Adjusted values of all points and retained blocks, to continue an adjustment.
-pub(super) struct Reached {
+#[doc(hidden)]
+pub struct Reached {
     points: Vec<[f64; 3]>,
     stations: Vec<f64>,
 }
 
 impl Assembled {
+    /// Returns the least-squares problem.
+    pub fn problem(&self) -> &AnyProblem<'_> {
+        self.problem.any()
+    }
+
+    /// Returns the number of active images.
+    pub fn images(&self) -> usize {
+        self.problem.model.images.len()
+    }
+
+    /// Returns the indices of some parameters of photos, each given by photo and number.
+    pub fn of_photos(&self, parameters: &[(usize, usize)]) -> Vec<usize> {
+        let unknown = |&(photo, number): &(usize, usize)| self.problem.model.of_block(photo).start + number;
+        parameters.iter().map(unknown).collect()
+    }
+
+    /// Returns the owner of each parameter (0: photo, 1: shared camera, 2: shared parameter, 3: point), its index in the network, and the
+    /// number of the parameter there.
+    pub fn names(&self) -> Vec<[usize; 3]> {
+        let model = &self.problem.model;
+        let mut names = vec![[0; 3]; self.problem.initial.len()];
+        for (owner, range) in (0..model.stations()).flat_map(|block| model.owners(block)) {
+            let (kind, index) = match owner {
+                Owner::Photo(photo) => (0, photo),
+                Owner::Camera(camera) => (1, camera),
+                Owner::Common(common) => (2, common),
+            };
+            range.enumerate().for_each(|(number, unknown)| names[unknown] = [kind, index, number]);
+        }
+        for (place, &point) in self.points.iter().enumerate() {
+            model.of_point(place).enumerate().for_each(|(k, unknown)| names[unknown] = [3, point, k]);
+        }
+        names
+    }
+
     /// Returns, for each of `points` points, its index in the model; None if it is excluded.
     pub fn places(&self, points: usize) -> Vec<Option<usize>> {
         let mut place = vec![None; points];
@@ -149,7 +185,8 @@ impl Network {
     ///
     /// # Errors
     /// Values too large for double precision, points without intersection, too many parameters.
-    pub(super) fn assemble(
+    #[doc(hidden)]
+    pub fn assemble(
         &self,
         options: &Options,
         mut selected: Selected,

@@ -57,7 +57,8 @@ impl Reason {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct LeftOut {
+#[doc(hidden)]
+pub struct LeftOut {
     pub points: Vec<bool>,
     pub photos: Vec<bool>,
 }
@@ -67,7 +68,8 @@ impl Network {
     ///
     /// # Errors
     /// A state of another network.
-    pub(super) fn left_out(&self, photos: Vec<bool>, state: Option<&State>) -> Result<LeftOut, NetworkError> {
+    #[doc(hidden)]
+    pub fn left_out(&self, photos: Vec<bool>, state: Option<&State>) -> Result<LeftOut, NetworkError> {
         let mut all = LeftOut { points: vec![false; self.points.len()], photos };
         if let Some(state) = state {
             for (own, left) in [(&mut all.points, &state.collapsed), (&mut all.photos, &state.loose)] {
@@ -85,7 +87,8 @@ impl Network {
     /// (specification, open point 21). Points with parameters in other nodes of a larger network always remain.
     ///
     /// Points that observations connect with other objects are the last ones. Images on excluded photos are ignored.
-    pub(super) fn select(&self, left_out: &LeftOut, surroundings: Surroundings) -> Selected {
+    #[doc(hidden)]
+    pub fn select(&self, left_out: &LeftOut, surroundings: Surroundings) -> Selected {
         let loose = &left_out.photos;
         let named = surroundings.indices(BlockOf::Point);
         let all = self.point_images(loose);
@@ -143,7 +146,8 @@ impl Network {
     }
 
     /// Returns the photos with free parameters that appear in neither an image nor an observation.
-    pub(super) fn untouched_photos(&self) -> Vec<bool> {
+    #[doc(hidden)]
+    pub fn untouched_photos(&self) -> Vec<bool> {
         let mut untouched: Vec<bool> =
             self.photos.iter().map(|photo| photo.sd.iter().any(|sd| sd.is_infinite())).collect();
         self.images.iter().for_each(|image| untouched[image.photo] = false);
@@ -176,11 +180,12 @@ impl Network {
 }
 
 /// Active objects, with neighbouring points in sequence, and exclusions.
-pub(super) struct Selected {
+#[doc(hidden)]
+pub struct Selected {
     pub points: Vec<usize>,
     /// Number of points that no observation connects with other objects, which are the first ones.
     pub locals: usize,
-    pub images: ByPoint,
+    pub(super) images: ByPoint,
     pub observations: Vec<usize>,
     pub dropped: Vec<Dropped>,
     /// Photos whose images are excluded, ascending: they are fixed.

@@ -149,7 +149,8 @@ impl Solution {
     }
 
     /// Returns the results of an adjustment in the order of the network. Called from a worker thread.
-    pub(super) fn new(
+    #[doc(hidden)]
+    pub fn new(
         network: &Network,
         options: &Options,
         assembled: &Assembled,
@@ -238,17 +239,21 @@ impl Solution {
     }
 }
 
+impl Assembled {
+    /// Returns the sums of squares of an adjustment at its final values, by group.
+    pub fn sums_of_squares(&self, network: &Network, adjustment: &Adjustment, values: &[f64]) -> SumsByType {
+        let observations = observations(network, &self.problem, adjustment);
+        sums_of_squares(&self.problem, adjustment, values, &observations)
+    }
+}
+
 /// Returns a sum of squares over the degrees of freedom, None if these are not positive.
 fn over(sum: f64, degrees_of_freedom: i64) -> Option<f64> {
     (degrees_of_freedom > 0).then(|| sum / degrees_of_freedom as f64)
 }
 
 /// Returns the owners of parameters that are of one type, each with the number of the parameter there.
-pub(super) fn owned(
-    problem: &Problem<Bundle>,
-    unknowns: &[usize],
-    of: fn(usize) -> Owner,
-) -> Vec<(usize, usize)> {
+fn owned(problem: &Problem<Bundle>, unknowns: &[usize], of: fn(usize) -> Owner) -> Vec<(usize, usize)> {
     let own = |&unknown: &usize| {
         let (owner, number) = problem.model.owner(unknown)?;
         Some((owner.index(of)?, number))
@@ -256,7 +261,7 @@ pub(super) fn owned(
     unknowns.iter().filter_map(own).collect()
 }
 
-pub(super) fn observations(
+fn observations(
     network: &Network,
     problem: &Problem<Bundle>,
     adjustment: &Adjustment,
@@ -278,7 +283,7 @@ pub(super) fn observations(
 }
 
 /// Returns the sums of squares by group (GIANT guide, Appendix E).
-pub(super) fn sums_of_squares(
+fn sums_of_squares(
     problem: &Problem<Bundle>,
     adjustment: &Adjustment,
     unknowns: &[f64],

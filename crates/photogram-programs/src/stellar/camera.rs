@@ -2,9 +2,9 @@
 //! lens.
 
 use photocore::geometry::plate_lens;
-use photocore::geometry::{
-    Camera as Lens, Distortion, Matrix3, PlateLens, Plated, Vector3, pointing_with_partials,
-};
+use photocore::geometry::{Camera as Lens, Distortion, Matrix3, PlateLens, Plated, Vector3};
+
+use crate::sky::pointing_with_partials;
 
 pub use photocore::geometry::plate_lens::{Decentering, Form, INTERIOR};
 

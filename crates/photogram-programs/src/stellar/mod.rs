@@ -10,7 +10,7 @@
 //!
 //! ```
 //! use photocore::adjustment;
-//! use photocore::geometry::{Air, Station, sky::REFRACTION};
+//! use photogram_programs::sky::{Air, REFRACTION, Station};
 //! use photogram_programs::stellar::{
 //!     Attitude, COMMON, Calibration, Camera, Decentering, Form, Image, Kind, Options, Star, Weights,
 //! };
@@ -66,7 +66,7 @@ mod solution;
 
 use thiserror::Error;
 
-use photocore::geometry::Station;
+use crate::sky::Station;
 use photocore::normals::LayoutError;
 use photocore::{Stopped, adjustment};
 

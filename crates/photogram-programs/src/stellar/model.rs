@@ -2,8 +2,9 @@
 
 use super::{Attitude, COMMON, Calibration, Camera, INTERIOR, Image, PlateImage, StellarError, TAU, Weights};
 use photocore::adjustment::{Evaluated, Model};
-use photocore::geometry::Standard;
 use photocore::internal;
+
+use crate::sky::Standard;
 use photocore::normals::{GroupRows, Tie, TieRows};
 
 /// Upper triangular root R of a weight matrix P = R^T R.

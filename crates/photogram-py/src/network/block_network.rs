@@ -2,10 +2,9 @@
 
 use numpy::PyArray1;
 use photocore::Threads;
-use photocore::adjustment::{DatumColumns, DatumError};
-use photocore::network::{
-    AdjustedInParts, Network, NetworkDatum, NetworkError as Failure, Options, Solution, UnknownName,
-};
+use photocore::adjustment::DatumError;
+use photocore::network::{Network, NetworkDatum, NetworkError as Failure, Options, Solution};
+use photogram_parts::{AdjustedInParts, DatumColumns, UnknownName};
 use pyo3::prelude::*;
 
 use super::covariances::{BlockCovariances, factored, refused};
@@ -118,7 +117,9 @@ impl BlockNetwork {
     #[pyo3(signature = (*, threads))]
     fn held_for_datum(&self, py: Python<'_>, threads: usize) -> PyResult<Vec<(usize, usize)>> {
         let workers = Workers::of(threads, self.network.images.len());
-        let held = watched(py, workers, None, |pool, _| self.network.held_for_datum(&self.options, pool))?;
+        let held = watched(py, workers, None, |pool, _| {
+            photogram_parts::held_for_datum(&self.network, &self.options, pool)
+        })?;
         held.map_err(|error| refused(&error))
     }
 
@@ -139,7 +140,7 @@ impl BlockNetwork {
         let workers = Workers::of(threads, self.network.images.len());
         let found = watched(py, workers, None, |pool, _| {
             let adjusted = AdjustedInParts { middle, held: &held, names: &names, values: &values };
-            self.network.parts_in_datum(&self.options, &inner, adjusted, pool)
+            photogram_parts::parts_in_datum(&self.network, &self.options, &inner, adjusted, pool)
         })?;
         let (moved, DatumColumns { b, t, condition, exact }) = found.map_err(|error| refused(&error))?;
         let [moved, b, t] = [moved, b, t].map(|column| PyArray1::from_vec(py, column));

@@ -5,12 +5,10 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use photocore::Threads;
-use photocore::adjustment::{DatumOfPart, Watch};
-use photocore::network::{
-    BlockOf, FormedNode as Formed, Network, NetworkError as Failure, Node as Core, NodePrediction, Options,
-    Surroundings,
-};
+use photocore::adjustment::Watch;
+use photocore::network::{BlockOf, Network, NetworkError as Failure, Options, Surroundings};
 use photocore::normals::{Contribution, packed};
+use photogram_parts::{DatumOfPart, FormedNode as Formed, Node as Core, NodePrediction};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -242,7 +240,7 @@ impl Node {
         let below = children.into_iter().map(blocks).collect::<PyResult<_>>()?;
         let surroundings = Surroundings { outer: blocks(outer)?, below, middle, held };
         let workers = Workers::of(threads, network.images.len());
-        let node = watched(py, workers, None, |pool, _| network.node(options, surroundings, pool))?;
+        let node = watched(py, workers, None, |pool, _| Core::new(network, options, surroundings, pool))?;
         node.map(|node| Self { node: Arc::new(node), records }).map_err(|error| failed(&error))
     }
 

@@ -5,7 +5,7 @@
 //!
 //! The attitude alpha, omega, kappa of a stellar camera follows equation 19 of NOAA TR NOS 55.
 
-use super::rotation::{Matrix3, Vector3};
+use photocore::geometry::{Matrix3, Vector3};
 
 /// One second of arc in radians.
 pub const ARCSEC: f64 = std::f64::consts::PI / 648_000.0;

@@ -1,19 +1,25 @@
-//! Node of the elimination tree of a network that is adjusted in parts: Helmert blocking (Helmert 1880; Wolf 1978).
+//! Node of the elimination tree of a network that is adjusted in parts.
 //!
 //! A node is a network with its own photos and the photos that later nodes eliminate. Its points are those whose first photo in the
-//! elimination order is its own, with all their images. Additional observations are assigned likewise. See
-//! [`crate::adjustment::Linearized::of_part`] for the algorithm.
+//! elimination order is its own, with all their images. Additional observations are assigned likewise.
+//!
+//! A node has inner parameters, which only it and its child nodes involve, and outer parameters, which parent nodes eliminate. It forms its
+//! normal equations from its observations and the contributions of its children. It eliminates the inner parameters and passes a
+//! [`Contribution`] to its parent. From the step and cofactors of the outer parameters it then computes those for the inner ones. The root
+//! has zero outer parameters.
 
-use super::error::NetworkError;
-use super::input::{Image, Network, Options, Point};
-use super::model::Owner;
-use super::problem::Assembled;
-use super::selection::{Dropped, Selected};
-use super::solution::{Solution, SumsByType, observations, owned, sums_of_squares};
-use super::surroundings::{BlockOf, Surroundings};
-use crate::Threads;
-use crate::adjustment::{Adjustment, Counts, DatumOfPart, Linearized, Model, PartError, PartOptions, Watch};
-use crate::normals::{Contribution, Operations, ReducedRights, packed};
+use photocore::Threads;
+use photocore::adjustment::{AdjustError, Adjustment, AnyProblem, Counts, Linearized, Phase, Watch};
+use photocore::internal::{Assembled, ObservationEquations, Reweighting, between};
+use photocore::network::{
+    Dropped, Image, Network, NetworkError, Options, Point, Solution, SumsByType, Surroundings,
+};
+use photocore::normals::{
+    Contribution, Equations, FactorOptions, InvertOptions, Operations, ReducedRights, SolveOptions, packed,
+};
+
+use crate::datum::{DatumOfPart, UnknownName};
+use crate::interface::{check_blocks, release, with_coefficients};
 
 /// A node with ordered blocks; parameter values are separate.
 #[derive(Debug)]
@@ -30,14 +36,14 @@ pub struct Node {
 /// A node linearized at given values, with its own parameters eliminated.
 #[derive(Debug)]
 pub struct FormedNode {
-    pub(super) part: Linearized,
+    linearized: Linearized,
     /// Reduced right-hand sides, until they are solved.
-    pub(super) reduced: Option<ReducedNode>,
+    reduced: Option<Reduced>,
 }
 
 /// Reduced right-hand sides of a node.
 #[derive(Debug)]
-pub(super) enum ReducedNode {
+enum Reduced {
     /// For a datum of the larger network.
     Datum(ReducedRights),
     /// Of a chord step.
@@ -71,109 +77,42 @@ pub struct NodePrediction {
 /// output.
 const FOUND: usize = 7;
 
-impl Network {
-    /// Returns the active parts of the whole network.
-    pub(super) fn select_whole(
-        &self,
-        middle: Option<[f64; 3]>,
-        threads: &Threads,
-    ) -> Result<Selected, NetworkError> {
-        self.check()?;
-        let left_out = self.left_out(self.untouched_photos(), None)?;
-        let surroundings = Surroundings { middle, ..Surroundings::default() };
-        Ok(threads.install(|| self.select(&left_out, surroundings)))
-    }
-
-    /// Returns the parameters that an adjustment of the whole network fixes as its datum: photo and number of the pose parameter (see
-    /// [`Surroundings::held`]). The list is empty if the network defines a datum.
-    ///
-    /// # Errors
-    /// Errors of [`Network::adjust`] before its first iteration.
-    pub fn held_for_datum(
-        &self,
-        options: &Options,
-        threads: &Threads,
-    ) -> Result<Vec<(usize, usize)>, NetworkError> {
-        let selected = self.select_whole(None, threads)?;
-        if self.is_placed(&selected) {
-            return Ok(vec![]);
-        }
-        let assembled = threads.install(|| self.assemble(options, selected, None))?;
-        let problem = &assembled.problem;
-        let held = problem.any().to_hold(&problem.initial, threads);
-        let in_photos = owned(problem, &held, Owner::Photo);
-        (in_photos.len() == held.len()).then_some(in_photos).ok_or(NetworkError::Node(
-            "in parts trajectories take no datum: it would be held by their coefficients",
-        ))
-    }
-
-    /// Converts the network to a node of a larger one.
+impl Node {
+    /// Creates the node of a network in a larger one.
     ///
     /// # Errors
     /// An inconsistent network, missing blocks or blocks without free parameters, insufficient memory.
-    pub fn node(
-        &self,
+    pub fn new(
+        network: &Network,
         options: &Options,
         surroundings: Surroundings,
         threads: &Threads,
-    ) -> Result<Node, NetworkError> {
-        self.check()?;
-        self.check_blocks(&surroundings)?;
-        let surroundings = self.told_by_coefficients(surroundings);
-        let mut network = self.clone();
-        network.release(&surroundings);
+    ) -> Result<Self, NetworkError> {
+        network.check()?;
+        check_blocks(network, &surroundings)?;
+        let surroundings = with_coefficients(network, surroundings);
+        let mut network = network.clone();
+        release(&mut network, &surroundings);
         let in_photos = surroundings.held.clone();
-        let none = self.left_out(vec![false; self.photos.len()], None)?;
+        let none = network.left_out(vec![false; network.photos.len()], None)?;
         let selected = threads.install(|| network.select(&none, surroundings));
         let assembled = threads.install(|| network.assemble(options, selected, None))?;
         assembled.check_memory(options)?;
-        let layout = assembled.problem.layout();
+        let layout = assembled.problem().layout();
         let outer = layout.unknowns_of(layout.outer()).collect();
         let below =
             layout.contributions().iter().map(|blocks| layout.unknowns_of(blocks).collect()).collect();
-        let model = &assembled.problem.model;
-        let held = in_photos.iter().map(|&(photo, number)| model.of_block(photo).start + number).collect();
-        Ok(Node { network, options: *options, assembled, outer, below, held })
+        let held = assembled.of_photos(&in_photos);
+        Ok(Self { network, options: *options, assembled, outer, below, held })
     }
 
-    /// Removes the weights of outer blocks, because they count in the node that eliminates them. Fixed parameters remain fixed.
-    pub(super) fn release(&mut self, surroundings: &Surroundings) {
-        let outer = &surroundings.outer;
-        let (films, _) = self.commons_by_block(&surroundings.indices(BlockOf::Common));
-        let mut photos_of = vec![0; self.cameras.len()];
-        self.photos.iter().for_each(|photo| photos_of[photo.camera] += 1);
-        let named = |camera: usize| outer.contains(&BlockOf::Camera(camera));
-        let mut cameras: Vec<usize> = (0..self.cameras.len()).filter(|&camera| named(camera)).collect();
-        for block in outer {
-            match *block {
-                BlockOf::Photo(own) => {
-                    let photo = &mut self.photos[own];
-                    free(&mut photo.sd);
-                    cameras.extend(Some(photo.camera).filter(|&camera| photos_of[camera] == 1));
-                    let film = films.get(own).into_iter().flatten();
-                    film.for_each(|&common| free(&mut self.commons[common].sd));
-                }
-                BlockOf::Camera(_) => {}
-                BlockOf::Common(common) => free(&mut self.commons[common].sd),
-                BlockOf::Point(point) => free(&mut self.points[point].sd),
-            }
-        }
-        for camera in cameras {
-            free(&mut self.cameras[camera].sd);
-            self.cameras[camera].covariance = None;
-        }
+    fn problem(&self) -> &AnyProblem<'_> {
+        self.assembled.problem()
     }
-}
 
-/// Makes weighted parameters free.
-fn free(sd: &mut [f64]) {
-    sd.iter_mut().filter(|sd| **sd > 0.0).for_each(|sd| *sd = f64::INFINITY);
-}
-
-impl Node {
     /// Returns the number of parameters of a state: local points, then photos, shared cameras, shared parameters and other points.
     pub fn size(&self) -> usize {
-        self.assembled.problem.initial.len()
+        self.problem().initial.len()
     }
 
     /// Returns the number of image observations.
@@ -193,7 +132,7 @@ impl Node {
 
     /// Returns the numbers of observations and parameters that are assigned to this node.
     pub fn counts(&self) -> Counts {
-        self.assembled.problem.counts(&self.held)
+        self.problem().counts(&self.held)
     }
 
     /// Returns the excluded points.
@@ -203,12 +142,12 @@ impl Node {
 
     /// Returns the initial state: given photos, points from the intersection of their rays.
     pub fn initial(&self) -> &[f64] {
-        &self.assembled.problem.initial
+        &self.problem().initial
     }
 
     /// Returns the predicted cost, computed from the sparsity pattern.
     pub fn prediction(&self) -> NodePrediction {
-        let system = &self.assembled.problem.system;
+        let system = &self.problem().system;
         let (layout, symbolic) = (system.layout(), system.symbolic());
         let outer = symbolic.outer_unknowns();
         let handed = packed(outer) + self.below.iter().map(|own| packed(own.len())).sum::<usize>();
@@ -216,7 +155,7 @@ impl Node {
             points: layout.all_locals().len(),
             interior: layout.all_retained().len() - outer,
             outer,
-            images: self.assembled.problem.model.images.len(),
+            images: self.assembled.images(),
             observations: layout.equations(),
             operations: symbolic.operations(layout),
             node: self.bytes(),
@@ -230,14 +169,14 @@ impl Node {
     /// Returns the bytes of images and points, in input and in model order, and of the sparsity pattern.
     fn bytes(&self) -> usize {
         let (numbers, indices) = (size_of::<f64>(), size_of::<u32>());
-        let (network, problem) = (&self.network, &self.assembled.problem);
+        let network = &self.network;
         let of_image = size_of::<Image>() + size_of::<usize>() + 2 * numbers + 3 * indices;
         let of_point = size_of::<Point>() + size_of::<usize>() + 2 * indices;
         size_of::<Image>() * network.images.len()
             + size_of::<Point>() * network.points.len()
-            + of_image * problem.model.images.len()
-            + of_point * problem.model.points.len()
-            + 3 * numbers * problem.initial.len()
+            + of_image * self.assembled.images()
+            + of_point * self.assembled.points.len()
+            + 3 * numbers * self.size()
     }
 
     /// Returns the state after a step: attitudes step by rotation vectors.
@@ -247,7 +186,7 @@ impl Node {
     pub fn advance(&self, state: &[f64], step: &[f64]) -> Result<Vec<f64>, NetworkError> {
         self.check(&[state, step])?;
         let mut state = state.to_vec();
-        self.assembled.problem.model.advance(&mut state, step);
+        self.problem().model.advance(&mut state, step);
         Ok(state)
     }
 
@@ -257,9 +196,9 @@ impl Node {
     /// The state has a wrong length.
     pub fn relocate(&self, state: &[f64], threads: &Threads) -> Result<Vec<f64>, NetworkError> {
         self.check(&[state])?;
-        let (model, mut moved) = (&self.assembled.problem.model, state.to_vec());
-        if threads.install(|| model.relocate(&mut moved)) {
-            let retained = 3 * model.locals;
+        let (problem, mut moved) = (self.problem(), state.to_vec());
+        if threads.install(|| problem.model.relocate(&mut moved)) {
+            let retained = problem.layout().all_locals().end;
             moved[retained..].copy_from_slice(&state[retained..]);
         }
         Ok(moved)
@@ -271,17 +210,17 @@ impl Node {
     /// The state has a wrong length.
     pub fn objective(&self, state: &[f64], threads: &Threads) -> Result<(SumsByType, f64), NetworkError> {
         self.check(&[state])?;
-        let (problem, loss) = (&self.assembled.problem, self.options.adjustment.loss);
+        let (problem, loss) = (self.problem(), self.options.adjustment.loss);
         let reached = Adjustment::between(problem, loss, &self.held, state, state.to_vec(), threads);
-        let observed = threads.install(|| observations(&self.network, problem, &reached));
-        let sums = sums_of_squares(problem, &reached, state, &observed);
-        Ok((sums, problem.any().objective(state, &reached.residuals, loss)))
+        let sums = threads.install(|| self.assembled.sums_of_squares(&self.network, &reached, state));
+        Ok((sums, problem.objective(state, &reached.residuals, loss)))
     }
 
     /// Forms the normal equations at a state, adds the contributions of child nodes and eliminates the parameters of this node.
     ///
+    /// * `contributions`: of the child nodes, in the order of [`Node::below`], which is also the order of summation;
     /// * `damping`: fraction of the diagonal that is added to it;
-    /// * `curved`: whether the second-order term of the loss is included.
+    /// * `curved`: whether the second-order term of the loss is included, as for short steps; cofactors are computed without it.
     ///
     /// # Errors
     /// A state of wrong length, contributions for other parameters, an interruption, insufficient memory.
@@ -294,16 +233,30 @@ impl Node {
         watch: Watch<'_>,
     ) -> Result<FormedNode, NetworkError> {
         self.check(&[state])?;
-        let problem = &self.assembled.problem;
-        let loss = self.options.adjustment.loss;
-        let options = PartOptions { held: self.held.clone(), damping, loss, curved };
-        let part = Linearized::of_part(problem, state.to_vec(), contributions, options, threads, watch);
-        Ok(FormedNode { part: part.map_err(|error| self.named(error))?, reduced: None })
+        let fit = |(given, places): (&Contribution<'_>, &Vec<usize>)| given.is_over(places.len());
+        let all = contributions.len() == self.below.len();
+        require(all && contributions.iter().zip(&self.below).all(fit))?;
+        let (problem, loss) = (self.problem(), self.options.adjustment.loss);
+        let reweighting = loss.map(|loss| Reweighting { loss, curved });
+        let equations = ObservationEquations::new(problem, reweighting, state, &self.held, threads)
+            .with_contributions(contributions);
+        let options = FactorOptions { damping, ..FactorOptions::default() };
+        let mut between = between(watch, Phase::Form, problem.layout().locals());
+        let (values, held) = (state.to_vec(), self.held.clone());
+        let formed = Linearized::of(&equations, values, held, &options, threads, &mut between);
+        let mut linearized = formed.map_err(|error| self.named(error))?;
+        if loss.is_some() {
+            let residuals = problem.residuals_at(threads, equations.at());
+            linearized.sum_of_squares = problem.objective(state, &residuals, loss);
+        }
+        // The factor is stored until back-substitution, possibly with many others.
+        problem.system.release();
+        Ok(FormedNode { linearized, reduced: None })
     }
 
     /// Returns the undetermined parameters of this node as an error; None if all are determined.
     pub fn undetermined(&self, formed: &FormedNode) -> Option<NetworkError> {
-        formed.part.undetermined().map(|error| NetworkError::new(error, &self.assembled))
+        formed.linearized.undetermined().map(|error| self.named(error))
     }
 
     /// Returns the step of all parameters for a given step of the outer ones.
@@ -317,10 +270,12 @@ impl Node {
         threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
-        formed
-            .part
-            .solve_part(&self.assembled.problem, outer, threads, watch)
-            .map_err(|error| self.named(error))
+        require(outer.len() == self.outer.len())?;
+        let equations = formed.linearized.equations(self.problem(), threads);
+        let mut between = between(watch, Phase::Solve, self.problem().layout().locals());
+        let options = SolveOptions { outer, ..SolveOptions::default() };
+        let step = formed.linearized.solve(&equations, &options, threads, &mut between);
+        step.map_err(|error| self.named(error))
     }
 
     /// Returns the solution with cofactors, and the cofactors for each child node: lower triangles, column by column.
@@ -341,17 +296,32 @@ impl Node {
         watch: Watch<'_>,
     ) -> Result<(Solution, Vec<Vec<f64>>), NetworkError> {
         self.check(&[state])?;
-        let size = |datum: &DatumOfPart<'_>| {
-            let d = datum.common.len().isqrt();
-            let columns = [datum.t.len(), datum.w.len()] == [d * self.size(); 2];
-            columns && datum.common.len() == d * d && datum.last.len() == self.size()
-        };
-        if !datum.as_ref().is_none_or(size) {
+        if !datum.as_ref().is_none_or(|datum| datum.is_over(self.size())) {
             return Err(NetworkError::State);
         }
-        let problem = &self.assembled.problem;
-        let found = formed.part.invert_part(problem, outer, state.to_vec(), datum, threads, watch);
-        let (adjustment, below) = found.map_err(|error| self.named(error))?;
+        let outer_cofactors = packed(self.outer.len());
+        let FormedNode { linearized, .. } = formed;
+        require(
+            outer.len() == outer_cofactors && linearized.factor.damping == 0.0 && !linearized.is_curved(),
+        )?;
+        let mut linearized = linearized.determined().map_err(|error| self.named(error))?;
+        let (problem, loss) = (self.problem(), self.options.adjustment.loss);
+        linearized.transformation = datum.map(|datum| datum.transformation(self.size()));
+        let inverted = {
+            let equations = linearized.equations(problem, threads);
+            let mut between = between(watch, Phase::Invert, problem.layout().locals());
+            let options = InvertOptions { outer, ..InvertOptions::default() };
+            let inverted = linearized.invert(&equations, &options, threads, &mut between);
+            inverted.map_err(|error| self.named(error))?
+        };
+        problem.system.release();
+        let of_blocks = |blocks: &Vec<u32>| inverted.selected.triangle(problem.layout(), blocks);
+        let below = problem.layout().contributions().iter().map(of_blocks).collect::<Result<_, _>>()?;
+        let before = datum.map(|datum| state.iter().zip(datum.last).map(|(x, dx)| x - dx).collect());
+        let before: &Vec<f64> = before.as_ref().unwrap_or(&inverted.values);
+        let mut adjustment =
+            Adjustment::between(problem, loss, &inverted.held, before, state.to_vec(), threads);
+        adjustment.put(problem, inverted);
         let lost = adjustment.lost.unwrap_or(0.0);
         let mut solution = self.solution_of(adjustment, threads);
         solution.datum.relative_error = lost;
@@ -369,7 +339,7 @@ impl Node {
         threads: &Threads,
     ) -> Result<Solution, NetworkError> {
         self.check(&[state, before])?;
-        let problem = &self.assembled.problem;
+        let problem = self.problem();
         let loss = self.options.adjustment.loss;
         let adjustment = Adjustment::between(problem, loss, &self.held, before, state.to_vec(), threads);
         Ok(self.solution_of(adjustment, threads))
@@ -380,18 +350,19 @@ impl Node {
         threads.install(make)
     }
 
-    pub(super) fn check(&self, states: &[&[f64]]) -> Result<(), NetworkError> {
+    fn check(&self, states: &[&[f64]]) -> Result<(), NetworkError> {
         let fit = states.iter().all(|state| state.len() == self.size());
         if fit { Ok(()) } else { Err(NetworkError::State) }
     }
 
     /// Returns true if the last steps may converge slowly, so that a chord step pays.
     pub fn ends_slowly(&self) -> bool {
-        self.assembled.problem.model.ends_slowly()
+        self.problem().model.ends_slowly()
     }
 
-    /// Reduces the right-hand side of a chord step, a second step with the existing factors ([`Linearized::reduce_chord`]), at a state with the contributions of the child nodes. Returns the contribution to outer parameters, and
-    /// the decrease of the sum of squares by this node; None if the factor lacks the required cache.
+    /// Reduces the right-hand side of a chord step, a second step with the existing factors, at a state with the contributions
+    /// `left` of the child nodes. Returns the contribution to outer parameters, and the decrease of the sum of squares by this node; None if
+    /// the factor lacks the required cache.
     ///
     /// # Errors
     /// Wrong numbers of parameters, an interruption, insufficient memory.
@@ -412,12 +383,59 @@ impl Node {
         for (left, places) in left.iter().zip(self.below()) {
             places.iter().zip(*left).for_each(|(&place, value)| rights[place] += value);
         }
-        let problem = &self.assembled.problem;
-        let found = formed.part.reduce_chord(problem, state, rights, threads, watch);
-        let reduced = found.map_err(|error| self.named(error))?;
-        let found = reduced.as_ref().map(|reduced| (reduced.left(), reduced.products[0]));
-        formed.reduced = reduced.map(ReducedNode::Chord);
+        let FormedNode { linearized, .. } = formed;
+        if !linearized.factor.has_cached() {
+            return Ok(None);
+        }
+        let problem = self.problem();
+        let equations = ObservationEquations::new(problem, None, state, &self.held, threads);
+        let prior = problem.prior_equations(&problem.terms(state), &self.held);
+        self.zero_fixed(formed, &mut rights);
+        rights.iter_mut().zip(&prior.right).for_each(|(right, own)| *right += own);
+        let mut between = between(watch, Phase::Solve, problem.layout().locals());
+        let (factor, of) = (&formed.linearized.factor, (&equations as &dyn Equations, &prior));
+        let reduced = problem.system.reduce_chord(threads, factor, of, &rights, &mut between);
+        let reduced = reduced.map_err(|error| self.named(error.into()))?;
+        let found = (reduced.left(), reduced.products[0]);
+        formed.reduced = Some(Reduced::Chord(reduced));
+        Ok(Some(found))
+    }
+
+    /// Reduces right-hand sides over a state (B of this node), with the contributions of child nodes. Returns the right-hand sides of outer
+    /// parameters, and the node's share of B^T Q B, row by row.
+    ///
+    /// # Errors
+    /// A wrong number of parameters, an interruption, insufficient memory.
+    pub fn reduce_rights(
+        &self,
+        formed: &mut FormedNode,
+        mut rights: Vec<f64>,
+        threads: &Threads,
+        watch: Watch<'_>,
+    ) -> Result<(Vec<f64>, Vec<f64>), NetworkError> {
+        if !rights.len().is_multiple_of(self.size().max(1)) {
+            return Err(NetworkError::State);
+        }
+        self.zero_fixed(formed, &mut rights);
+        let FormedNode { linearized, .. } = formed;
+        let problem = self.problem();
+        let equations = linearized.equations(problem, threads);
+        let mut between = between(watch, Phase::Solve, problem.layout().locals());
+        let of = (&equations as &dyn Equations, &linearized.prior);
+        let reduced = problem.system.reduce_rights(threads, &linearized.factor, of, &rights, &mut between);
+        let reduced = reduced.map_err(|error| self.named(error.into()))?;
+        let found = (reduced.left(), reduced.products.clone());
+        formed.reduced = Some(Reduced::Datum(reduced));
         Ok(found)
+    }
+
+    /// Zeroes right-hand sides of constrained or fixed parameters, whose normal equations are decoupled.
+    fn zero_fixed(&self, formed: &FormedNode, rights: &mut [f64]) {
+        let free = |unknown: &usize| formed.linearized.is_free(self.problem(), *unknown);
+        let fixed: Vec<usize> = (0..self.size()).filter(|unknown| !free(unknown)).collect();
+        for right in rights.chunks_exact_mut(self.size().max(1)) {
+            fixed.iter().for_each(|&unknown| right[unknown] = 0.0);
+        }
     }
 
     /// Solves the reduced right-hand sides, or the reduced chord step, for all parameters, given the solutions of the outer ones; only once.
@@ -431,51 +449,57 @@ impl Node {
         threads: &Threads,
         watch: Watch<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
-        let (part, problem) = (&formed.part, &self.assembled.problem);
+        let (linearized, problem) = (&formed.linearized, self.problem());
+        let equations = linearized.equations(problem, threads);
+        let of = (&equations as &dyn Equations, &linearized.prior);
+        let mut between = between(watch, Phase::Solve, problem.layout().locals());
+        let (system, factor) = (&problem.system, &linearized.factor);
         let found = match formed.reduced.take() {
-            Some(ReducedNode::Chord(reduced)) if reduced.left().len() == outer.len() => {
-                part.solve_reduced_rights(problem, reduced, outer, threads, watch)
+            Some(Reduced::Chord(reduced)) if reduced.left().len() == outer.len() => {
+                system.solve_reduced_rights(threads, factor, of, reduced, outer, &mut between)
             }
-            Some(ReducedNode::Datum(reduced)) if reduced.left().len() == outer.len() => {
-                part.solve_reduced_rights(problem, reduced, outer, threads, watch)
+            Some(Reduced::Datum(reduced)) if reduced.left().len() == outer.len() => {
+                system.solve_reduced_rights(threads, factor, of, reduced, outer, &mut between)
             }
             _ => return Err(NetworkError::State),
         };
-        found.map_err(|error| self.named(error))
+        found.map_err(|error| self.named(error.into()))
     }
 
-    pub(super) fn assembled(&self) -> &Assembled {
-        &self.assembled
+    /// Returns the name of each parameter of a state.
+    pub fn names(&self) -> Vec<UnknownName> {
+        self.assembled.names()
     }
 
-    pub(super) fn named(&self, error: PartError) -> NetworkError {
-        match error {
-            PartError::Foreign => {
-                NetworkError::Node("what a node is given is over other unknowns, or damped")
-            }
-            PartError::Adjust(error) => NetworkError::new(error, &self.assembled),
-        }
+    fn named(&self, error: AdjustError) -> NetworkError {
+        NetworkError::new(error, &self.assembled)
     }
+}
+
+/// Returns an error unless contributions, steps or cofactors fit the parameters, and equations are not damped.
+fn require(fit: bool) -> Result<(), NetworkError> {
+    let error = NetworkError::Node("what a node is given is over other unknowns, or damped");
+    if fit { Ok(()) } else { Err(error) }
 }
 
 impl FormedNode {
     /// Returns true if a reduced chord step is still to be solved.
     pub fn has_chord(&self) -> bool {
-        matches!(self.reduced, Some(ReducedNode::Chord(_)))
+        matches!(self.reduced, Some(Reduced::Chord(_)))
     }
 
     /// Returns the contribution to the outer parameters; empty at the second call.
     pub fn take_contribution(&mut self) -> Contribution<'static> {
-        self.part.take_contribution()
+        self.linearized.factor.take_contribution()
     }
 
     /// Returns the weighted sum of squares of this node.
     pub fn sum_of_squares(&self) -> f64 {
-        self.part.sum_of_squares()
+        self.linearized.sum_of_squares()
     }
 
     /// Returns the node's share of the decrease of the sum of squares predicted for a full step.
     pub fn decrease(&self) -> f64 {
-        self.part.decrease()
+        self.linearized.decrease()
     }
 }
