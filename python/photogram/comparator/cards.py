@@ -93,8 +93,13 @@ def _micrometres(record: Record, columns: tuple[int, int], decimals: int) -> flo
 
 
 def _header(record: Record) -> Header:
+    flags = [_integer(record, column, column) != 0 for column in range(1, 6)]
     header = Header(
-        *(_integer(record, column, column) != 0 for column in range(1, 6)),
+        left_handed=flags[0],
+        sorted_input=flags[1],
+        other_least_count=flags[2],
+        skip_card=flags[3],
+        plot_each_case=flags[4],
         comparator=_integer(record, 6, 7),
         secondary=record.columns(8, 8) == "R",
         operators=tuple(_integer(record, 10 + 3 * case, 12 + 3 * case) for case in range(CASES)),

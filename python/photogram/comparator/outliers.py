@@ -251,8 +251,8 @@ def problems(
     """Return problems: an unusable correction, grids worse than their standard deviations, outliers."""
     messages = []
     if screening.harmful:
-        fields = {"change": screening.change_um, "sd": screening.sigma_um}
-        messages.append(Message(phrase("comparators.harm", **fields)))
+        harm = phrase("comparators.harm", change=screening.change_um, sd=screening.sigma_um)
+        messages.append(Message(harm))
     for plate, result in joint.plates.items() if joint else ():
         if result.test and (reason := result.test.problem()):
             text = phrase("comparators.grid-test", plate=plate, sd=result.sigma_um, reason=reason)

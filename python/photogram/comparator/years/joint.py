@@ -95,7 +95,7 @@ def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
         v, w = _residuals(each, own_back, steps, cofactors, shift)
         squares += float((each.weight * v**2).sum())
         # Every given coordinate is an observation and an unknown.
-        freedom += v.size - np.count_nonzero(each.inverse.diagonal())
+        freedom += v.size - int(np.count_nonzero(each.inverse.diagonal()))
         standardized.append(np.split(w, np.cumsum([len(case.points) for case in record.cases])[:-1]))
     test = global_test(squares, freedom)
     if test is None:
@@ -210,7 +210,7 @@ def _residuals(
 
 def _covariance(reduced: Sequence[_Equations], back: Sequence[Floats], cofactors: Floats) -> Floats:
     by_grid = np.concatenate([own[:PARAMETERS] for own in back])
-    covariance = by_grid @ cofactors @ by_grid.T
+    covariance: Floats = by_grid @ cofactors @ by_grid.T
     for k, each in enumerate(reduced):
         own = slice(k * PARAMETERS, (k + 1) * PARAMETERS)
         covariance[own, own] += each.inverse[:PARAMETERS, :PARAMETERS]
