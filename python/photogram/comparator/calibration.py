@@ -381,14 +381,14 @@ def _averages(
 
 def _grid_sigma(session: Session, plates: Mapping[int, PlateResult], options: Options) -> float:
     """Return the grid standard deviation of all plates for the analysis of variance."""
-    squares, points = 0.0, 0
+    variances = []
     for plate, result in plates.items():
         sigma = session.grids[plate].sigma_um
         if sigma is None:
             sigma = np.nan_to_num(result.sigma_um(as_published=options.as_published))
-        squares += len(result.averages.points) * sigma**2
-        points += len(result.averages.points)
-    return math.sqrt(squares / points)
+        variances.append(sigma**2)
+    points = [len(result.averages.points) for result in plates.values()]
+    return math.sqrt(np.average(variances, weights=points))
 
 
 def _joint(

@@ -176,15 +176,14 @@ def read_points(points: Indices, xy_um: Floats) -> list[PointReadings]:
     ]
 
 
-def pool(points: Iterable[PointReadings], *, listed_dof: int | None = None) -> Precision:
+def pool(readings: Sequence[PointReadings], *, means: int | None = None) -> Precision:
     """Pool points of one or more cases (equations 13, 22, 23; 28, 30, 31).
 
-    Each variance is weighted by its degrees of freedom: sums of squares over readings minus means, or over
-    `listed_dof`.
+    Each variance is weighted by its degrees of freedom: sums of squares over readings minus `means`, the
+    number of all means by default.
     """
-    readings = list(points)
     total = sum(point.count for point in readings)
-    dof = total - len(readings) if listed_dof is None else listed_dof
+    dof = total - (len(readings) if means is None else means)
 
     def mean(values: Iterable[float]) -> float:
         return math.fsum(values) / dof if dof > 0 else math.nan
@@ -214,10 +213,6 @@ def pool_points(
     for case in cases:
         for point in case:
             by_number.setdefault(point.point, []).append(point)
-
-    def dof(readings: list[PointReadings], means: int) -> int | None:
-        return sum(point.count for point in readings) - means if as_published else None
-
-    by_point = {number: pool(own, listed_dof=dof(own, 1)) for number, own in by_number.items()}
-    everything = [point for own in by_number.values() for point in own]
-    return by_point, pool(everything, listed_dof=dof(everything, len(by_number)))
+    each, all_means = (1, len(by_number)) if as_published else (None, None)
+    by_point = {number: pool(own, means=each) for number, own in by_number.items()}
+    return by_point, pool([point for own in by_number.values() for point in own], means=all_means)
