@@ -229,7 +229,7 @@ def test_the_effects_of_undetected_errors_agree_with_the_dense_program(case):
             assert ratio <= 4.0 or row["component"] >= 0, name
             continue
         compared.add(row["code"])
-        _, points, _, largest, _, _, moved = row["effect"]
+        points, _, largest, _, _, moved = row["effect"]
         relative = np.abs(changes) / dense.point_sd
         assert np.nan_to_num(moved) == pytest.approx(changes, rel=1e-5, abs=1e-6 * np.abs(changes).max()), (
             name

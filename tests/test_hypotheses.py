@@ -145,7 +145,7 @@ def test_every_hypothesis_agrees_with_a_dense_program(case):
         if row["effect"] is None:
             assert row["bias_to_noise"] <= GOLDEN["K"] or row["component"] >= 0
             continue
-        _, points, others, ratio, _, change, _ = row["effect"]
+        points, others, ratio, _, change, _ = row["effect"]
         assert points == expected["points_beyond_4"], name
         assert others == expected["points_beyond_4_besides_own"], name
         assert ratio == pytest.approx(expected["largest_sd"], rel=1e-6), name

@@ -86,7 +86,6 @@ class Effect:
     """Effects of an undetected error on points, by the most changed coordinates."""
 
     changes: Floats  # (d, 3) changes of the `drawn` points
-    checked: bool  # Whether check points detect it
     points: int  # beyond the limit
     # Points without those that the error belongs to, beyond the limit although check points exist
     others: int
@@ -144,7 +143,7 @@ class Hypotheses:
     def _is_harmful(self, row: int) -> bool:
         """Whether an undetected error moves too many points."""
         code, effect = self.code[row], self.effects[row]
-        if effect.checked or code in UNGRADED:
+        if code in UNGRADED:
             return False
         if code in DATUM and (np.isnan(self.mdb[row, 0]) or (self.compared and code not in SCALES)):
             return False

@@ -76,8 +76,7 @@ fn hypothesis_columns(py: Python<'_>, found: Hypotheses) -> PyResult<Bound<'_, P
     let effects = PyDict::new(py);
     for (row, own) in all.iter_mut().enumerate() {
         if let Some(own) = own.effect.take() {
-            let effect =
-                (own.checked, own.points, own.others, own.ratio, own.at, own.change, table(py, own.checks)?);
+            let effect = (own.points, own.others, own.ratio, own.at, own.change, table(py, own.checks)?);
             effects.set_item(row, effect)?;
         }
     }

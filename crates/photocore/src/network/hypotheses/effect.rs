@@ -20,8 +20,6 @@ pub struct Effect {
     /// Points that the error does not belong to, and that the largest error changes beyond the limit which neither residuals nor check
     /// points detect.
     pub others: usize,
-    /// Whether the check points detect the error.
-    pub checked: bool,
     /// The largest change in standard deviations.
     pub ratio: f64,
     /// The point and the coordinate of this change; None if nothing changes.
@@ -172,8 +170,7 @@ impl<'a> Sample<'a> {
         let shown = self.shown(&checks);
         // Residuals and check points together detect an error that is smaller by this factor.
         let smaller = (1.0 + shown / self.noncentrality).sqrt();
-        let checked = shown > self.noncentrality;
-        let mut effect = Effect { points: 0, others: 0, checked, ratio: 0.0, at: None, change: 0.0, checks };
+        let mut effect = Effect { points: 0, others: 0, ratio: 0.0, at: None, change: 0.0, checks };
         let (mut points, mut others) = (0.0, 0.0);
         let retained = self.locals.len()..self.points.len();
         for index in (0..self.counted).chain(retained) {
