@@ -31,7 +31,7 @@ from photogram.results.snooping_result import Snooped
 from photogram.summaries import Brief, Rows, few
 from photogram.targets.board import Board
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.corners import Corners
+from photogram.targets.corners import Corners, check_points
 from photogram.targets.housing import transformed
 from photogram.targets.motion import CLOCK, MAX_GAP_SECONDS, POWERS, dated, moved, moving, pictures_in_motion
 from photogram.targets.options import Regularisation, Shape, Synchronisation
@@ -137,7 +137,7 @@ class Calibration(Valued, Brief):
         if self.sync == "none" or self.references is None:
             self._set("references", np.arange(count) if self.sync == "none" else np.zeros(count, np.int64))
         check_arrays(self, cameras=count, views=self.corners.view_count)
-        self.corners.check(self.board)
+        check_points(self.corners, self.board)
         self._leave_out(np.asarray(self.poses))
         for name in ("sd_sensors", "sd_bend"):
             values = np.asarray(getattr(self, name))
@@ -332,9 +332,9 @@ class Calibration(Valued, Brief):
 
     def residuals(self) -> Floats:
         """Return (n, 2) observed minus computed corners with the given values, pixels."""
-        return self.corners.xy - self.computed(self.places())
+        return self.corners.xy - self._computed(self.places())
 
-    def computed(self, places: Floats) -> Floats:
+    def _computed(self, places: Floats) -> Floats:
         """Return (n, 2) the corners of board points (b, 3) with the given values, pixels."""
         corners = self.corners
         seen = transformed(self.picture_poses()[corners.picture], places[corners.point])
@@ -468,7 +468,7 @@ def simulate_corners(calibration: Calibration, seed: int = 1) -> Calibration:
     places = calibration.places().copy()
     if calibration.shape == "points":
         places += calibration.board.deviations(corners.view_count) * random.standard_normal(places.shape)
-    xy = calibration.computed(places)
+    xy = calibration._computed(places)
     if not np.isfinite(xy).all():
         row = int(np.argmin(np.isfinite(xy).all(axis=1)))
         raise InputError(phrase("targets.no-image", corner=corners.title(row)))

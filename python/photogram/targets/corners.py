@@ -164,13 +164,6 @@ class Corners(Valued, Brief):
             use=self.use[own],
         )
 
-    def check(self, board: Board) -> None:
-        """Raise an InputError if a board lacks one of the points."""
-        beyond = np.flatnonzero(self.point >= len(board.places))
-        if len(beyond):
-            fields = {"count": len(board.places), "board": board.described}
-            raise InputError(phrase("targets.corner-beyond", corner=self.title(int(beyond[0])), **fields))
-
     def poor(self, places: Floats) -> dict[str, Phrase]:
         """Return images that do not determine a camera, with reasons.
 
@@ -184,6 +177,14 @@ class Corners(Valued, Brief):
             elif _on_a_line(self.xy[rows]) or _on_a_line(places[self.point[rows]]):
                 reasons[name] = phrase("targets.line")
         return reasons
+
+
+def check_points(corners: Corners, board: Board) -> None:
+    """Raise an InputError if a board lacks one of the points of corners."""
+    beyond = np.flatnonzero(corners.point >= len(board.places))
+    if len(beyond):
+        fields = {"count": len(board.places), "board": board.described}
+        raise InputError(phrase("targets.corner-beyond", corner=corners.title(int(beyond[0])), **fields))
 
 
 def _on_a_line(places: Floats) -> bool:

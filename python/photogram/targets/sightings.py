@@ -15,7 +15,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.targets.board import Board
-from photogram.targets.corners import Corners
+from photogram.targets.corners import Corners, check_points
 from photogram.targets.vision import composed
 
 _MIN_COLUMN_RATIO = 1e-9  # of a homography of non-collinear corners
@@ -240,7 +240,7 @@ class Sightings:
 
         InputError: if points are missing on the board.
         """
-        corners.check(board)
+        check_points(corners, board)
         places = board.places
         axes = np.eye(4)
         if board.kind == "points":  # axes of the least-squares plane, from the centroid
