@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from types import MethodType
 from typing import Any, Concatenate, Generic, ParamSpec
@@ -17,6 +18,7 @@ from photogram.plots.residuals import films, residuals
 from photogram.plots.tests import tests
 from photogram.plots.trajectories import trajectory
 from photogram.plots.undetected import undetected
+from photogram.show.page import Drawing, about
 from photogram.show.sketch.plot import Plot
 
 P = ParamSpec("P")
@@ -102,3 +104,16 @@ def sketch_of(result: object, name: str) -> Plot | None:
         return PLOTS[name](result)
     except InputError:
         return None
+
+
+def drawings(result: object, names: Sequence[str]) -> dict[str, Drawing]:
+    """Return the drawings of a result by name; those without data are empty."""
+    return {
+        name: Drawing(
+            f"picture-{name}",
+            about(f"{name}.title"),
+            about(f"{name}.caption"),
+            partial(sketch_of, result, name),
+        )
+        for name in names
+    }

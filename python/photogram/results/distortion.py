@@ -152,14 +152,9 @@ def distortion_curve(
         (n,) in the unit of image coordinates; by default equidistant to 1.25 times the largest observed
         radius.
     """
-    return lens_curve(camera, _images(result, camera), radii)
-
-
-def lens_curve(camera: AdjustedCamera, images: Floats, radii: Floats | None = None) -> DistortionCurve | None:
-    """Return the distortion curve of a camera with (k, 2) images in the focal plane."""
     terms = [k for k, name in enumerate(camera.names) if RADIAL.fullmatch(name)]
     used = any(camera.values[k] != 0 or k in camera.estimated for k in terms)
-    observed = _largest_radius(images, camera.camera)
+    observed = _largest_radius(_images(result, camera), camera.camera)
     if not used or observed == 0:
         return None
     at = np.linspace(0.0, BEYOND * observed, ROWS) if radii is None else np.asarray(radii, dtype=np.float64)

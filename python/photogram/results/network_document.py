@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Indices
 from photogram.lazy_dataclasses import replace
-from photogram.plots.accessor import sketch_of
+from photogram.plots.accessor import drawings as drawn
 from photogram.results import network_sections as sections
 from photogram.results import network_tables as declared
 from photogram.results.network import AdjustedNetwork
@@ -243,14 +242,6 @@ def _worst_table(tests: Tests, places: Indices) -> quantity.Table:
 PICTURES = ("network", "residuals", "redundancy", "tests", "correlations", "distortion", "features", "films")
 
 
-def drawings(result: object, names: Sequence[str] = PICTURES) -> dict[str, Drawing]:
+def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:
     """Return the drawings of a result by name; those without data are empty."""
-    return {
-        name: Drawing(
-            f"picture-{name}",
-            about(f"{name}.title"),
-            about(f"{name}.caption"),
-            partial(sketch_of, result, name),
-        )
-        for name in names
-    }
+    return drawn(result, PICTURES)

@@ -10,7 +10,6 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
-from photogram.results.distortion import curve_deviations
 from photogram.stellar.parameters import INDEX
 from photogram.stellar.sky import TAU, refraction
 
@@ -70,7 +69,9 @@ def distortion_curves(result: Result) -> DistortionCurves:
 
 
 def _errors(rows: Floats, covariance: Floats, names: list[str]) -> Floats:
-    return curve_deviations(covariance, [INDEX[name] for name in names], rows)
+    chosen = [INDEX[name] for name in names]
+    variances = np.einsum("ni,ij,nj->n", rows, covariance[np.ix_(chosen, chosen)], rows)
+    return np.asarray(np.sqrt(np.maximum(variances, 0)), float)
 
 
 @dataclass(frozen=True, eq=False)

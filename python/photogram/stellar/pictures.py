@@ -12,11 +12,8 @@ import numpy as np
 from photogram.arguments.types import Bools
 from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import dataclass
+from photogram.plots.accessor import drawings
 from photogram.plots.picture_data import Correlated, Curve, Curves, Images
-from photogram.results.distortion import lens_curve
-from photogram.results.network_document import drawings
-from photogram.results.parts import AdjustedCamera
-from photogram.results.picture_data import curves_of
 from photogram.show.page import Drawing, Layers
 from photogram.show.sketch.marks import Line, Mark, Panel, band, horizontal_line, spread
 from photogram.show.sketch.plot import Plot
@@ -26,13 +23,13 @@ from photogram.stellar.camera_tables import correlations
 from photogram.stellar.curves import distortion_curves, refraction_curves
 from photogram.stellar.findings import night_standardized, plate_standardized
 from photogram.stellar.parameters import GROUPS
-from photogram.stellar.sky_cameras import SkyCamera
 
 if TYPE_CHECKING:
     from photogram.stellar import CalibratedNight, Result
 
 PICTURES = ("residuals", "tests", "correlations", "distortion")
 _RADII = 200
+_WIDEST = np.radians(110)
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,25 +99,32 @@ def night_pictured(result: CalibratedNight) -> PicturedStars:
         down=True,
         scanned=np.zeros(len(found.xy), bool),
     )
-    camera = adjusted_camera(result.camera, len(found.xy))
-    known = np.flatnonzero(np.diag(camera.covariance) > 0)
-    names = [camera.names[row] for row in known]
-    correlated = [Correlated(camera.name, names, camera.correlations[np.ix_(known, known)])]
-    curve = lens_curve(camera, found.xy) if result.camera.facts.groups else None
+    camera = result.camera
+    known = np.flatnonzero(camera.known)
+    matrix = correlations(camera.covariance)[np.ix_(known, known)]
+    correlated = [Correlated(camera.lens, [camera.names[row] for row in known], matrix)]
     marks = [result.verdict.marks(each.kind, each.values.shape) for each in tested]
-    distortion = [] if curve is None else [curves_of(camera, curve)]
-    return PicturedStars(images, tested, marks, correlated, distortion, found.mean_error)
+    return PicturedStars(images, tested, marks, correlated, _night_distortion(result), found.mean_error)
 
 
-def adjusted_camera(camera: SkyCamera, images: int) -> AdjustedCamera:
-    """Return a calibrated camera as one of blocks, in the order of its model."""
-    block_camera = camera.as_camera(camera.lens)
-    none = np.zeros(len(block_camera.names))
-    covariance = np.zeros((len(none), len(none)))
-    covariance[np.ix_(camera.facts.places, camera.facts.places)] = camera.covariance
-    return AdjustedCamera(
-        camera.lens, block_camera, block_camera, covariance, covariance, none, none, 0, images
-    )
+def _night_distortion(result: CalibratedNight) -> list[Curves]:
+    """Return the effect of the radial terms along x against the radius without them."""
+    camera = result.camera
+    if not camera.facts.groups:
+        return []
+    radial = [row for row, name in enumerate(camera.names) if name.startswith("k")]
+    rows = np.arange(len(camera.values))
+    axes = replace(camera, values=np.where(np.isin(rows, [0, 1, 2, 3, *radial]), camera.values, 0.0))
+    ideal = replace(camera, values=np.where(rows < 4, camera.values, 0.0))
+    theta = np.linspace(0, min(camera.largest_angle(result.night.frame), _WIDEST), _RADII)
+    along = np.column_stack([np.sin(theta), np.zeros(len(theta)), np.cos(theta)])
+    seen, radii = (each.images(along)[:, 0] - camera.values[2] for each in (axes, ideal))
+    partials = axes.partials(along)[:, 0, radial]
+    covariance = camera.covariance[np.ix_(radial, radial)]
+    errors = np.sqrt(np.maximum(np.einsum("ni,ij,nj->n", partials, covariance, partials), 0.0))
+    observed = float(np.linalg.norm(result.calibration.xy - camera.values[2:4], axis=1).max())
+    curve = Curve("", seen - radii, {"curve": errors} if errors.any() else {})
+    return [Curves(f"the lens {camera.lens}", "px", radii, observed, [curve])]
 
 
 def plate_drawings(result: Result) -> Layers:
