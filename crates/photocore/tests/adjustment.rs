@@ -12,7 +12,7 @@ use std::thread::{self, ThreadId};
 
 use photocore::adjustment::{
     AdjustError, Adjustment, Evaluated, Event, Linearized, Method, Model, Options, Phase, Problem, Published,
-    Status, Stop, adjust,
+    Requests, Status, Stop, adjust, adjust_with,
 };
 use photocore::normals::{GroupRows, Layout, LayoutError, Ordering, System};
 use photocore::{Stopped, Threads};
@@ -133,7 +133,8 @@ const STRICT: Options = Options {
 
 fn run(problem: &Problem<Frames>, options: &Options) -> Result<Adjustment, AdjustError> {
     let threads = Threads::new(1).unwrap();
-    adjust(problem, options, &threads, &mut |_| ControlFlow::Continue(()))
+    let requests = Requests { history: usize::MAX, ..Requests::default() };
+    adjust_with(problem, options, requests, &threads, &mut |_| ControlFlow::Continue(()))
 }
 
 /// Two points with both coordinates: the datum of the plane, and its scale.
@@ -224,7 +225,7 @@ fn corrections_lead_from_the_initial_to_the_adjusted_values() {
         // One iteration fewer ends at the start of the last iteration.
         let max_iterations = adjusted.iterations.len() - 1;
         let before = run(&problem, &Options { method, max_iterations, ..STRICT }).unwrap();
-        for (i, correction) in adjusted.last_local_corrections.iter().enumerate() {
+        for (i, correction) in adjusted.last_corrections.iter().enumerate() {
             assert!((before.unknowns[i] + correction - adjusted.unknowns[i]).abs() < 1e-13);
         }
     }

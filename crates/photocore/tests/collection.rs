@@ -191,6 +191,7 @@ fn adjusted_from(
         reserved: 0,
         minimum: None,
         screens: Screens::default(),
+        photo_corrections: false,
     };
     collection.adjustment(&options).on(&threads).run()
 }

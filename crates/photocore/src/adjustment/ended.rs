@@ -20,7 +20,6 @@ impl Adjustment {
         unknowns: Vec<f64>,
         threads: &Threads,
     ) -> Self {
-        let locals = problem.layout().all_locals();
         let symbolic = problem.system.symbolic();
         let residuals = problem.residuals(threads, &unknowns);
         let weights =
@@ -29,8 +28,8 @@ impl Adjustment {
             status: Status::Converged,
             initial_sum_of_squares: f64::NAN,
             iterations: vec![],
-            history: vec![unknowns[locals.end..].to_vec()],
-            last_local_corrections: vec![0.0; locals.len()],
+            history: vec![],
+            last_corrections: vec![0.0; unknowns.len()],
             weights: loss.map(weights),
             residuals,
             redundancy: None,
@@ -69,12 +68,9 @@ impl Adjustment {
         reached: Vec<f64>,
         threads: &Threads,
     ) -> Self {
-        let locals = problem.layout().all_locals();
-        let corrections = before[locals.clone()].iter().zip(&reached).map(|(from, to)| to - from).collect();
+        let last_corrections = before.iter().zip(&reached).map(|(from, to)| to - from).collect();
         let after = Self::at(problem, loss, reached, threads);
-        let history = [vec![before[locals.end..].to_vec()], after.history].concat();
-        let (counts, datum) = (problem.counts(held), held.to_vec());
-        Self { history, last_local_corrections: corrections, counts, datum, ..after }
+        Self { last_corrections, counts: problem.counts(held), datum: held.to_vec(), ..after }
     }
 
     /// Creates the result from inverted normal equations, without iterations.

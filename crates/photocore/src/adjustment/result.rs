@@ -60,10 +60,11 @@ pub struct Adjustment {
     pub initial_sum_of_squares: f64,
     /// All iterations.
     pub iterations: Vec<Iteration>,
-    /// Retained unknowns in the order of the layout: initially and after each iteration.
+    /// Requested retained unknowns in the order of the layout ([`super::Requests::history`]): initially and after each iteration. Empty if
+    /// none are requested.
     pub history: Vec<Vec<f64>>,
-    /// Corrections of the local unknowns in the last iteration; zero without iterations.
-    pub last_local_corrections: Vec<f64>,
+    /// Corrections of the unknowns in the last iteration; zero without iterations.
+    pub last_corrections: Vec<f64>,
     /// Adjusted unknowns, in the order of the layout.
     pub unknowns: Vec<f64>,
     /// Observed minus computed, in the order of groups and rows, then of ties and rows, in the units of the observations.
@@ -111,7 +112,7 @@ impl Adjustment {
         self.status == Status::Converged && last <= NEGLIGIBLE && plain
     }
 
-    /// Returns the corrections of all retained unknowns in every iteration, in the order of the layout.
+    /// Returns the corrections of the requested retained unknowns in every iteration, in the order of the layout.
     pub fn corrections(&self) -> impl Iterator<Item = Vec<f64>> + '_ {
         self.history.windows(2).map(|pair| pair[0].iter().zip(&pair[1]).map(|(from, to)| to - from).collect())
     }
@@ -122,7 +123,9 @@ impl Adjustment {
         let done = before.iterations.len();
         self.iterations.iter_mut().for_each(|iteration| iteration.number += done);
         self.iterations.splice(0..0, before.iterations);
-        self.history.splice(0..1, before.history);
+        if !before.history.is_empty() {
+            self.history.splice(0..self.history.len().min(1), before.history);
+        }
         self.initial_sum_of_squares = before.initial_sum_of_squares;
         self.effort.formations += before.effort.formations;
         self.effort.seconds.add(&before.effort.seconds);

@@ -60,6 +60,8 @@ pub struct Requests<'a> {
     ///
     /// [`Leverages::of`]: super::Leverages::of
     pub by_groups: Option<(&'a [usize], Option<usize>)>,
+    /// Number of the first retained unknowns whose values are stored at every iteration ([`Adjustment::history`]).
+    pub history: usize,
 }
 
 /// Adjusts as [`adjust`], with further results.
@@ -85,8 +87,8 @@ pub fn adjust_with(
         seconds: Seconds::default(),
         formations: 0,
         iterations: vec![],
-        history: vec![problem.initial[problem.layout().all_locals().end..].to_vec()],
-        last_local_corrections: vec![0.0; problem.layout().all_locals().len()],
+        history: vec![],
+        last_corrections: vec![0.0; problem.initial.len()],
         datum: vec![],
         chord: None,
         secants: Secants::default(),
@@ -190,7 +192,7 @@ pub(super) struct Run<'a, 'w> {
     formations: usize,
     pub iterations: Vec<Iteration>,
     history: Vec<Vec<f64>>,
-    last_local_corrections: Vec<f64>,
+    last_corrections: Vec<f64>,
     /// Unknowns constrained for a datum; in a trust region empty until the iterations have ended.
     pub datum: Vec<usize>,
     /// Length of the chord after the last step, if any.
@@ -351,7 +353,7 @@ impl<'a> Run<'a, '_> {
             initial_sum_of_squares,
             iterations: self.iterations,
             history: self.history,
-            last_local_corrections: self.last_local_corrections,
+            last_corrections: self.last_corrections,
             undetermined: end.undetermined,
             counts: problem.counts(&self.datum),
             datum: self.datum,
@@ -368,20 +370,25 @@ impl<'a> Run<'a, '_> {
         before: &[f64],
         after: &[f64],
     ) -> Result<(), AdjustError> {
-        let locals = self.problem.layout().all_locals();
-        let corrections =
-            before[locals.clone()].iter().zip(&after[locals.clone()]).map(|(from, to)| to - from);
-        self.last_local_corrections = corrections.collect();
+        self.last_corrections.clear();
+        self.last_corrections.extend(before.iter().zip(after).map(|(from, to)| to - from));
         self.curved = self.options.loss.is_some() && iteration.largest_change <= NEAR;
-        let corrected = match (self.has_moved, self.history.last()) {
-            // A datum transformation is not a correction.
-            (true, Some(last)) => {
-                let steps = before[locals.end..].iter().zip(&after[locals.end..]);
-                last.iter().zip(steps).map(|(value, (from, to))| value + (to - from)).collect()
+        let layout = self.problem.layout();
+        let first = layout.all_locals().end;
+        let kept = first..layout.unknowns().min(first.saturating_add(self.requests.history));
+        if !kept.is_empty() {
+            if self.history.is_empty() {
+                self.history.push(self.problem.initial[kept.clone()].to_vec());
             }
-            _ => after[locals.end..].to_vec(),
-        };
-        self.history.push(corrected);
+            let corrected = match self.history.last().filter(|_| self.has_moved) {
+                // A datum transformation is not a correction.
+                Some(last) => {
+                    last.iter().zip(&self.last_corrections[kept]).map(|(value, step)| value + step).collect()
+                }
+                None => after[kept].to_vec(),
+            };
+            self.history.push(corrected);
+        }
         self.iterations.push(iteration);
         stopped((self.watch)(Event::Iteration(iteration)))
     }

@@ -162,6 +162,9 @@ impl<'a> NetworkAdjustment<'a> {
             let unknowns = |&(_, place): &(usize, usize)| problem.model.of_point(place);
             points.iter().flat_map(unknowns).collect::<Vec<usize>>()
         });
+        if self.options.photo_corrections {
+            requests.history = problem.model.blocks.first[self.network.photos.len()];
+        }
         requests.by_groups = joint.as_deref().map(|joint| (joint, self.options.memory));
         adjustment::adjust_with(problem, &own, requests, threads, watch)
     }

@@ -156,7 +156,7 @@ pub(super) fn adjusted_points(
 ) -> Vec<Option<AdjustedPoint>> {
     let (model, origin) = (&problem.model, problem.model.origin);
     let cofactors = adjustment.cofactors.as_ref();
-    let corrections = last_corrections(adjustment);
+    let corrections = &adjustment.last_corrections;
     let (local, tied) = model.all_coordinates(unknowns);
     in_order(network.points.len(), points, |point, i| {
         let values = i.checked_sub(model.locals).map_or_else(|| &local[i], |tie| &tied[tie]);
@@ -179,7 +179,7 @@ pub(super) fn adjusted_points(
             coordinates,
             cofactors,
             redundancy: adjustment.prior_redundancy(first),
-            last_correction: std::array::from_fn(|k| corrections(first + k)),
+            last_correction: std::array::from_fn(|k| corrections[first + k]),
             rays: model.images_of(i).len(),
             behind: 0,
         }
@@ -200,18 +200,6 @@ pub(super) fn in_order<T: Send>(
         (own != u32::MAX).then(|| each(thing, own as usize))
     };
     parallel::map_in_place(count, TOGETHER, &of)
-}
-
-/// Returns the correction of each parameter in the last iteration; zero before any iteration.
-fn last_corrections(adjustment: &Adjustment) -> impl Fn(usize) -> f64 {
-    let local = &adjustment.last_local_corrections;
-    let retained = adjustment.history.last_chunk::<2>();
-    move |unknown| match unknown.checked_sub(local.len()) {
-        None => local[unknown],
-        Some(retained_unknown) => {
-            retained.map_or(0.0, |[before, after]| after[retained_unknown] - before[retained_unknown])
-        }
-    }
 }
 
 /// An adjusted shared parameter.

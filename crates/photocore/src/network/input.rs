@@ -228,6 +228,8 @@ pub struct Options {
     pub minimum: Option<Minimum>,
     /// Screens that may exclude points and photos.
     pub screens: Screens,
+    /// Whether to store the corrections of the photos in every iteration.
+    pub photo_corrections: bool,
 }
 
 /// Final state of an adjustment, sufficient to restore it.

@@ -94,7 +94,7 @@ pub struct Solution {
     pub cameras: Vec<AdjustedCamera>,
     /// Adjusted shared parameters.
     pub commons: Vec<AdjustedCommon>,
-    /// Corrections of the parameters of all photos in every iteration, photo by photo.
+    /// Corrections of the parameters of all photos in every iteration, photo by photo, if requested ([`Options::photo_corrections`]).
     pub photo_corrections: Vec<Vec<f64>>,
     /// Adjusted points; None for excluded ones.
     pub points: Vec<Option<AdjustedPoint>>,
@@ -185,13 +185,12 @@ impl Solution {
         };
         let observed = |image: usize, group: usize| adjustment.observed(group, network.images[image].sd);
         let images = in_order(network.images.len(), &problem.model.point_images.order, observed);
-        let photos_end = problem.model.blocks.first[network.photos.len()];
         let photos = adjusted_photos(network, assembled, &adjustment, &unknowns);
         let mut solution = Self {
             cameras: network.adjusted_cameras(assembled, &adjustment, &unknowns, &photos),
             photos,
             commons: network.adjusted_commons(assembled, &adjustment, &unknowns),
-            photo_corrections: adjustment.corrections().map(|all| all[..photos_end].to_vec()).collect(),
+            photo_corrections: adjustment.corrections().collect(),
             points: adjusted_points(network, assembled, &adjustment, &unknowns),
             images,
             observations,
@@ -234,6 +233,7 @@ impl Solution {
         let found = found.filter(|_| solution.adjustment.holds_after_last_step());
         solution.state.unknowns = unknowns;
         solution.adjustment.cofactors = None;
+        solution.adjustment.history = vec![];
         solution.adjustment.release_observations();
         (solution, found)
     }

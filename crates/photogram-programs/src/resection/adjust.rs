@@ -6,8 +6,8 @@ use super::degenerate::Degeneracy;
 use super::solution::{SinglePhoto, Solution, Solved};
 use super::{ControlPoint, Pose, Resection, ResectionError};
 use photocore::Threads;
-use photocore::adjustment::{self, AdjustError, Event, Options, Problem};
-use photocore::geometry::{ObjectSpace, rotation, rotation_angles};
+use photocore::adjustment::{self, AdjustError, Event, Options, Problem, Requests};
+use photocore::geometry::{ObjectSpace, POSE, rotation, rotation_angles};
 use photocore::normals::{Layout, LayoutError, Ordering, System};
 
 impl Resection {
@@ -77,7 +77,8 @@ impl Resection {
     ) -> Result<Solved, ResectionError> {
         let origin = self.origin(&start);
         let problem = threads.install(|| self.problem(&start, origin))?;
-        let adjusted = adjustment::adjust(&problem, options, threads, watch);
+        let requests = Requests { history: POSE, ..Requests::default() };
+        let adjusted = adjustment::adjust_with(&problem, options, requests, threads, watch);
         let adjustment = adjusted.map_err(|error| match error {
             AdjustError::Layout(error) => error.into(),
             AdjustError::Stopped(stopped) => ResectionError::Stopped(stopped),

@@ -151,6 +151,7 @@ pub fn block_network(
         reserved: LOADED,
         minimum: minimum.map(|(photo, coordinate)| Minimum { photo, coordinate }),
         screens: Screens::default(),
+        photo_corrections: true,
     };
     Ok(BlockNetwork { network, options, records })
 }
