@@ -9,4 +9,4 @@ mod interface;
 mod node;
 
 pub use datum::{AdjustedInParts, DatumColumns, DatumOfPart, UnknownName, held_for_datum, parts_in_datum};
-pub use node::{FormedNode, Node, NodePrediction};
+pub use node::{FormedNode, Node};

@@ -50,29 +50,6 @@ enum Reduced {
     Chord(ReducedRights<1>),
 }
 
-/// Predicted cost of a node, computed from its sparsity pattern.
-#[derive(Debug, Clone, Copy)]
-pub struct NodePrediction {
-    /// Number of coordinates of points without additional observations.
-    pub points: usize,
-    /// Number of parameters of blocks that are eliminated in this node.
-    pub interior: usize,
-    /// Number of parameters of outer blocks.
-    pub outer: usize,
-    /// Number of image observations.
-    pub images: usize,
-    /// Number of observation equations, without weighted parameters.
-    pub observations: usize,
-    /// Multiply-adds of each phase.
-    pub operations: Operations,
-    /// Bytes of the node itself.
-    pub node: usize,
-    /// Additional bytes while it is formed: the factor, the reduced points and their indices.
-    pub factor: usize,
-    /// Peak bytes of forming, inverting or writing, including the input and the node itself.
-    pub memory: usize,
-}
-
 /// Numbers stored per equation and its share of the parameters: residual, redundancy number and test value, in the results and in their
 /// output.
 const FOUND: usize = 7;
@@ -145,25 +122,36 @@ impl Node {
         &self.problem().initial
     }
 
-    /// Returns the predicted cost, computed from the sparsity pattern.
-    pub fn prediction(&self) -> NodePrediction {
+    /// Returns the predicted cost by name, computed from the sparsity pattern: numbers of parameters, images and equations, multiply-adds
+    /// of each phase, and bytes. `factor_bytes` are those of a formed node in addition to `node_bytes`; `memory_bytes` is the peak of
+    /// forming, inverting or writing, including the input and the node.
+    pub fn prediction(&self) -> [(&'static str, f64); 14] {
         let system = &self.problem().system;
         let (layout, symbolic) = (system.layout(), system.symbolic());
         let outer = symbolic.outer_unknowns();
         let handed = packed(outer) + self.below.iter().map(|own| packed(own.len())).sum::<usize>();
-        NodePrediction {
-            points: layout.all_locals().len(),
-            interior: layout.all_retained().len() - outer,
-            outer,
-            images: self.assembled.images(),
-            observations: layout.equations(),
-            operations: symbolic.operations(layout),
-            node: self.bytes(),
-            factor: size_of::<f64>() * (system.numbers_in_factor() - outer * outer + 3 * self.size()),
-            memory: self.bytes()
-                + system.memory_of_part()
-                + size_of::<f64>() * (handed + FOUND * layout.equations()),
-        }
+        let Operations { reduction, factor, inverse, .. } = symbolic.operations(layout);
+        let (count, bytes) = (|count: usize| count as f64, |count: usize| (size_of::<f64>() * count) as f64);
+        let node = count(self.bytes());
+        [
+            ("points", count(layout.all_locals().len())),
+            ("interior", count(layout.all_retained().len() - outer)),
+            ("outer", count(outer)),
+            ("images", count(self.assembled.images())),
+            ("observations", count(layout.equations())),
+            ("reduction", reduction),
+            ("factor", factor),
+            ("inverse", inverse),
+            ("node_bytes", node),
+            ("factor_bytes", bytes(system.numbers_in_factor() - outer * outer + 3 * self.size())),
+            (
+                "memory_bytes",
+                node + count(system.memory_of_part()) + bytes(handed + FOUND * layout.equations()),
+            ),
+            ("contribution_bytes", bytes(packed(outer) + 2 * outer)),
+            ("cofactor_bytes", bytes(packed(outer))),
+            ("step_bytes", bytes(outer)),
+        ]
     }
 
     /// Returns the bytes of images and points, in input and in model order, and of the sparsity pattern.

@@ -7,8 +7,8 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use photocore::Threads;
 use photocore::adjustment::Watch;
 use photocore::network::{BlockOf, Network, NetworkError as Failure, Options, Surroundings};
-use photocore::normals::{Contribution, packed};
-use photogram_parts::{DatumOfPart, FormedNode as Formed, Node as Core, NodePrediction};
+use photocore::normals::Contribution;
+use photogram_parts::{DatumOfPart, FormedNode as Formed, Node as Core};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -114,36 +114,8 @@ impl Node {
 
     #[getter]
     fn prediction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let NodePrediction {
-            points,
-            interior,
-            outer,
-            images,
-            observations,
-            operations,
-            node,
-            factor,
-            memory,
-        } = self.node.prediction();
-        let bytes = |count: usize| (size_of::<f64>() * count) as f64;
         let dict = PyDict::new(py);
-        let facts = [
-            ("points", points as f64),
-            ("interior", interior as f64),
-            ("outer", outer as f64),
-            ("images", images as f64),
-            ("observations", observations as f64),
-            ("reduction", operations.reduction),
-            ("factor", operations.factor),
-            ("inverse", operations.inverse),
-            ("node_bytes", node as f64),
-            ("factor_bytes", factor as f64),
-            ("memory_bytes", memory as f64),
-            ("contribution_bytes", bytes(packed(outer) + 2 * outer)),
-            ("cofactor_bytes", bytes(packed(outer))),
-            ("step_bytes", bytes(outer)),
-        ];
-        facts.into_iter().try_for_each(|(name, value)| dict.set_item(name, value))?;
+        self.node.prediction().into_iter().try_for_each(|(name, value)| dict.set_item(name, value))?;
         Ok(dict)
     }
 
