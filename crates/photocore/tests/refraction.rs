@@ -211,7 +211,8 @@ proptest! {
         let point = Point::new(space, case.point);
         let (station, foot) = (refraction.vertical(space, case.position), refraction.vertical(space, case.point));
         let lift = refraction.lift(&photo.orientation, &station, &point, &foot);
-        let projection = photo.linearize_lifted(&point, &lift);
+        let lifted = View { orientation: photo.orientation.under(&lift), camera: photo.camera };
+        let projection = lifted.linearize(&point.lifted(&lift));
         prop_assert_eq!(photo.project(&point.lifted(&lift)), projection.xy);
 
         let to_ground = case.sense == RotationSense::PhotoToGround;

@@ -483,11 +483,11 @@ impl FormedNode {
 
     /// Returns the weighted sum of squares of this node.
     pub fn sum_of_squares(&self) -> f64 {
-        self.linearized.sum_of_squares()
+        self.linearized.sum_of_squares
     }
 
     /// Returns the node's share of the decrease of the sum of squares predicted for a full step.
     pub fn decrease(&self) -> f64 {
-        self.linearized.decrease()
+        self.linearized.factor.decrease
     }
 }

@@ -8,7 +8,8 @@ use photocore::Threads;
 use photocore::adjustment::{Method, Options, Published, Status, Stop};
 use photocore::geometry::{ObjectSpace, Point, RotationSense, Vector3, View, rotation};
 use photogram_programs::resection::{
-    ControlPoint, Degeneracy, Known, Partials, Pose, Resection, ResectionError, Solution, three_points,
+    ControlPoint, Degeneracy, Known, Partials, Pose, Resection, ResectionError, Solution,
+    linearize_at_measured, three_points,
 };
 
 const C: f64 = -150.0;
@@ -153,14 +154,14 @@ fn published(pose: &Pose, point: &[f64; 3], [px, py]: [f64; 2]) -> [[f64; 6]; 2]
 fn partials_at_the_measured_image_are_those_of_the_report() {
     for (point, measured) in POINTS.iter().zip([[60.0, -20.0], [-75.0, 3.0], [10.0, 88.0]]) {
         let at = Point::new(ObjectSpace::Rectangular, *point);
-        let found = photo(&POSE).linearize_at_measured(&at, measured);
+        let found = linearize_at_measured(&photo(&POSE), &at, measured);
         let expected = published(&POSE, point, measured);
         for (row, other) in found.photo.iter().zip(expected) {
             for (a, b) in row.iter().zip(other) {
                 assert!((a - b).abs() < 1e-11 * (1.0 + b.abs()), "{found:?} {expected:?}");
             }
         }
-        let same = photo(&POSE).linearize_at_measured(&at, photo(&POSE).project(&at));
+        let same = linearize_at_measured(&photo(&POSE), &at, photo(&POSE).project(&at));
         assert_eq!(same.photo, photo(&POSE).linearize(&at).photo);
     }
 }

@@ -16,7 +16,7 @@ impl<'a> Run<'a, '_> {
     /// Ends at the current values without another step. Cofactors belong to the reweighted equations without second-order term, because
     /// their weights can be reported.
     pub(super) fn stay(&mut self, state: Iterate<'a>, status: Status) -> Result<End<'a>, AdjustError> {
-        let plain = state.linearized.damping() == 0.0 && !state.linearized.is_curved();
+        let plain = state.linearized.factor.damping == 0.0 && !state.linearized.is_curved();
         self.curved = false;
         let state = if plain { state } else { self.form(state.recycle(), 0.0)? };
         let Some(error) = state.linearized.undetermined() else { return Ok(End::with(status, state)) };
@@ -54,7 +54,7 @@ impl<'a> Run<'a, '_> {
 
     /// Ends without convergence.
     pub(super) fn exhausted(&mut self, state: Iterate<'a>, control: Control) -> Result<End<'a>, AdjustError> {
-        let diverged = state.linearized.damping() > MOST_DAMPING;
+        let diverged = state.linearized.factor.damping > MOST_DAMPING;
         let status = if diverged { Status::Diverged } else { Status::NotConverged };
         if control.always() {
             return self.rest(state.recycle(), status, !diverged, &control);

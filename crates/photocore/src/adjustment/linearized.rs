@@ -25,9 +25,9 @@ pub struct Linearized {
     pub(super) reweighting: Option<Reweighting>,
     #[doc(hidden)]
     pub prior: Prior,
-    #[doc(hidden)]
+    /// Factor of the normal equations.
     pub factor: Factor,
-    #[doc(hidden)]
+    /// Weighted sum of squares of observations and weighted unknowns at these values; not finite if an observation cannot be computed.
     pub sum_of_squares: f64,
     /// Datum for the cofactors.
     pub(super) basis: Option<Basis>,
@@ -156,24 +156,9 @@ impl Linearized {
         &self.held
     }
 
-    /// Weighted sum of squares of observations and weighted unknowns at these values; not finite if an observation cannot be computed.
-    pub fn sum_of_squares(&self) -> f64 {
-        self.sum_of_squares
-    }
-
-    /// Predicted decrease of the sum of squares by a full step.
-    pub fn decrease(&self) -> f64 {
-        self.factor.decrease
-    }
-
     /// Upper bound of the changes of all unknowns in a full step, in standard deviations.
     pub(super) fn change(&self) -> f64 {
         self.factor.decrease.sqrt()
-    }
-
-    /// Damping, as a fraction of the diagonal.
-    pub(super) fn damping(&self) -> f64 {
-        self.factor.damping
     }
 
     /// Whether the second-order term of a loss is used.
@@ -206,21 +191,6 @@ impl Linearized {
     /// Returns undetermined combinations of all unknowns, with components and diagonal elements of the normal equations.
     pub fn combinations(&self, layout: &Layout) -> Vec<Vec<(usize, f64, f64)>> {
         self.factor.deficiency().map_or(vec![], |found| found.combinations(layout))
-    }
-
-    /// Returns the retained unknowns without any observation or weight, ascending.
-    pub fn without_effect(&self, layout: &Layout) -> Vec<usize> {
-        self.factor.without_effect(layout)
-    }
-
-    /// Natural logarithm of the determinant of the reduced normal equations; None if it is zero.
-    pub fn log_determinant(&self) -> Option<f64> {
-        self.factor.log_determinant()
-    }
-
-    /// Returns the corrections of the retained unknowns, in the order of the layout.
-    pub fn reduced_corrections(&self, layout: &Layout) -> Vec<f64> {
-        self.factor.reduced_corrections(layout)
     }
 
     /// Whether an unknown is neither fixed nor constrained.

@@ -99,12 +99,12 @@ impl<'a> Run<'a, '_> {
         let mut control = Control::new(stop, damping, start.linearized.sum_of_squares);
         let mut state = start;
         while self.iterations.len() < self.options.max_iterations
-            && state.linearized.damping() <= MOST_DAMPING
+            && state.linearized.factor.damping <= MOST_DAMPING
         {
             let next = match self.step(&state)? {
                 Some(step) => self.take(state, step, &mut control)?,
                 None => {
-                    let damping = state.linearized.damping();
+                    let damping = state.linearized.factor.damping;
                     self.refuse(state.recycle(), damping, vec![], &mut control)?
                 }
             };
@@ -118,7 +118,7 @@ impl<'a> Run<'a, '_> {
 
     /// Applies a step unless it fails, or ends with it.
     fn take(&mut self, state: Iterate<'a>, step: Vec<f64>, control: &mut Control) -> Next<'a> {
-        let (damping, change) = (state.linearized.damping(), state.linearized.change());
+        let (damping, change) = (state.linearized.factor.damping, state.linearized.change());
         let (number, full) = (self.iterations.len() + 1, damping == 0.0);
         let iteration = Iteration { number, sum_of_squares: control.best, largest_change: change, damping };
         if full && self.is_end(&state, &step, control) {

@@ -57,5 +57,5 @@ pub use projection::{Projection, Ray, View};
 pub use refraction::{AirModel, Refraction, Vertical, Water, WaterModel};
 #[doc(hidden)]
 pub use rotation::principal_axes;
-pub use rotation::{Matrix3, Vector3, nearest_turns, rotation, rotation_angles, rotation_with_partials};
+pub use rotation::{Matrix3, Vector3, nearest_turns, rotation, rotation_angles};
 pub use space::{Lift, ObjectSpace, Point};

@@ -9,7 +9,7 @@ use super::camera::{CameraModel, Image, Perspective};
 use super::orientation::Orientation;
 use super::pose::POSE;
 use super::rotation::Vector3;
-use super::space::{Lift, ObjectSpace, Point};
+use super::space::{ObjectSpace, Point};
 
 /// Orientation and camera of a photo.
 #[derive(Debug, Clone, Copy)]
@@ -77,12 +77,6 @@ impl<C: CameraModel> View<C> {
         self.orientation.projection(&u, &self.camera.linearize(&u), point)
     }
 
-    /// Returns the image position of a lifted point and its partials, including the partials of the lift.
-    pub fn linearize_lifted(&self, point: &Point, lift: &Lift) -> Projection<C::Parameters> {
-        Self { orientation: self.orientation.under(lift), camera: self.camera.clone() }
-            .linearize(&point.lifted(lift))
-    }
-
     /// Returns the ray of an image position; None if the position is outside the range of the camera model.
     pub fn ray(&self, xy: [f64; 2]) -> Option<Ray> {
         self.camera.direction(xy).map(|direction| self.orientation.ray(&direction))
@@ -112,12 +106,5 @@ impl View {
     ) -> Self {
         let orientation = Orientation::from_angles(space, sense, position, attitude);
         Self { orientation, camera: Perspective { principal_distance } }
-    }
-
-    /// Returns the image position of a point and the partials of program W5344 (USGS Computer Contribution 2, 1969, equations 4 and 5).
-    /// They contain the measured image position instead of the computed one; both agree if the residuals are zero.
-    pub fn linearize_at_measured(&self, point: &Point, measured: [f64; 2]) -> Projection {
-        let u = self.orientation.sight(point);
-        self.orientation.projection(&u, &self.camera.linearize_at(&u, |_| measured), point)
     }
 }

@@ -64,28 +64,6 @@ pub fn rotation(angles: [f64; 3]) -> Matrix3 {
     )
 }
 
-/// Returns M and its partial derivatives with respect to omega, phi and kappa.
-#[inline]
-pub fn rotation_with_partials(angles: [f64; 3]) -> (Matrix3, [Matrix3; 3]) {
-    let m = rotation(angles);
-    let [(so, co), (sp, cp), (sk, ck)] = angles.map(f64::sin_cos);
-    let columns = |k: usize| Vector3::from(m.column(k));
-    let omega = Matrix3::from_columns(&[Vector3::zeros(), -columns(2), columns(1)]);
-    let phi = Matrix3::new(
-        -ck * sp,
-        so * cp * ck,
-        -co * cp * ck,
-        sk * sp,
-        -so * cp * sk,
-        co * cp * sk,
-        cp,
-        so * sp,
-        -co * sp,
-    );
-    let kappa = Matrix3::from_rows(&[m.row(1).into(), -m.row(0), Vector3::zeros().transpose()]);
-    (m, [omega, phi, kappa])
-}
-
 /// Returns the angles omega, phi, kappa of a rotation matrix: omega and kappa in [-pi, pi], phi in [-pi/2, pi/2].
 ///
 /// If phi is +-90 degrees, only omega + kappa (or their difference) is determined; the returned angles still reproduce the matrix.

@@ -46,7 +46,7 @@ use photocore::geometry::{ObjectSpace, RotationSense};
 use photocore::normals::LayoutError;
 
 pub use degenerate::Degeneracy;
-pub use solution::{AdjustedControl, AdjustedImage, Alternative, Solution};
+pub use solution::{AdjustedControl, AdjustedImage, Alternative, Solution, linearize_at_measured};
 pub use three_points::{Placement, three_points};
 
 /// A-priori values of three unknowns.

@@ -242,7 +242,7 @@ impl SinglePhoto {
     pub fn linearize(&self, photo: &View, point: &Point, index: usize) -> Projection {
         match self.partials {
             Partials::AtComputed => photo.linearize(point),
-            Partials::AtMeasured => photo.linearize_at_measured(point, self.points[index].xy),
+            Partials::AtMeasured => linearize_at_measured(photo, point, self.points[index].xy),
         }
     }
 
@@ -291,4 +291,11 @@ impl Evaluated for At<'_> {
             rows.retained[6 * row..][..6].copy_from_slice(&projection.photo[row]);
         }
     }
+}
+
+/// Returns the image position of a point and the partials of program W5344 (USGS Computer Contribution 2, 1969, equations 4 and 5). They
+/// contain the measured image position instead of the computed one; both agree if the residuals are zero.
+pub fn linearize_at_measured(photo: &View, point: &Point, measured: [f64; 2]) -> Projection {
+    let u = photo.orientation.sight(point);
+    photo.orientation.projection(&u, &photo.camera.linearize_at(&u, |_| measured), point)
 }

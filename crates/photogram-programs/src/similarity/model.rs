@@ -3,7 +3,7 @@
 use super::Station;
 use super::transform::Similarity;
 use photocore::adjustment::{Evaluated, Model};
-use photocore::geometry::{Matrix3, Vector3, rotation, rotation_with_partials};
+use photocore::geometry::{Matrix3, Vector3, rotation};
 use photocore::normals::GroupRows;
 
 /// Number of unknowns of the retained block: three changes of the rotation (omega, phi, kappa applied after the initial rotation), s, t.
@@ -96,4 +96,26 @@ impl Evaluated for StationsAt<'_> {
             retained[4 + row] = 1.0;
         }
     }
+}
+
+/// Returns the rotation matrix and its partial derivatives with respect to omega, phi and kappa.
+#[inline]
+pub fn rotation_with_partials(angles: [f64; 3]) -> (Matrix3, [Matrix3; 3]) {
+    let m = rotation(angles);
+    let [(so, co), (sp, cp), (sk, ck)] = angles.map(f64::sin_cos);
+    let columns = |k: usize| Vector3::from(m.column(k));
+    let omega = Matrix3::from_columns(&[Vector3::zeros(), -columns(2), columns(1)]);
+    let phi = Matrix3::new(
+        -ck * sp,
+        so * cp * ck,
+        -co * cp * ck,
+        sk * sp,
+        -so * cp * sk,
+        co * cp * sk,
+        cp,
+        so * sp,
+        -co * sp,
+    );
+    let kappa = Matrix3::from_rows(&[m.row(1).into(), -m.row(0), Vector3::zeros().transpose()]);
+    (m, [omega, phi, kappa])
 }

@@ -6,10 +6,10 @@
 //! The Gauss-Crout scheme follows TB 19, section 4.
 
 use super::error::{Cause, SimilarityError};
-use super::model::SCALE;
+use super::model::{SCALE, rotation_with_partials};
 use super::transform::{Parameters, Similarity};
 use super::{Method, Options, Station};
-use photocore::geometry::{Matrix3, Vector3, rotation, rotation_with_partials};
+use photocore::geometry::{Matrix3, Vector3, rotation};
 
 /// Largest correction of an angle, in radians, that ends the cycles.
 const ANGLE: f64 = 1e-5;

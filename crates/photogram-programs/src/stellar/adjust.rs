@@ -52,7 +52,7 @@ impl Calibration {
     pub fn without_effect(&self, threads: &Threads) -> Result<Vec<usize>, StellarError> {
         let problem = threads.install(|| self.problem(1.0, Partials::Exact))?;
         let normal = self.formed(&problem, vec![], threads)?;
-        Ok(parameters_of(&problem, normal.without_effect(problem.layout())))
+        Ok(parameters_of(&problem, normal.factor.without_effect(problem.layout())))
     }
 
     /// Forms the normal equations at the initial values, with some unknowns fixed.
@@ -65,7 +65,7 @@ impl Calibration {
         let failed = |error| self.named(problem, error, threads);
         let normal = Linearized::form(problem, None, problem.initial.clone(), held, threads, &mut go_on)
             .map_err(failed)?;
-        if normal.sum_of_squares().is_finite() { Ok(normal) } else { Err(failed(AdjustError::NotFinite)) }
+        if normal.sum_of_squares.is_finite() { Ok(normal) } else { Err(failed(AdjustError::NotFinite)) }
     }
 
     /// Translates an error of the engine to the stars and parameters concerned.
@@ -179,7 +179,7 @@ impl Calibration {
         problem: &Problem<StarImages<'_>>,
         threads: &Threads,
     ) -> Result<Option<(f64, Vec<f64>)>, StellarError> {
-        let Some(log_determinant) = normal.log_determinant() else { return Ok(None) };
+        let Some(log_determinant) = normal.factor.log_determinant() else { return Ok(None) };
         let parameters: Vec<usize> =
             (problem.layout().all_locals().end..problem.layout().unknowns()).collect();
         let cofactors = normal.joint(problem, &parameters, None, threads, &mut go_on);

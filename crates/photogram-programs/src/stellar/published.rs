@@ -44,7 +44,7 @@ impl Calibration {
     pub fn correction(&self, tolerances: &Tolerances, threads: &Threads) -> Result<Correction, StellarError> {
         let problem = threads.install(|| self.problem(1.0, Partials::Published(*tolerances)))?;
         let (first, layout) = (self.formed(&problem, vec![], threads)?, problem.layout());
-        let idle = first.without_effect(layout);
+        let idle = first.factor.without_effect(layout);
         let normal = if idle.is_empty() { first } else { self.formed(&problem, idle.clone(), threads)? };
         if let Some(error @ AdjustError::UndeterminedLocals(_)) = normal.undetermined() {
             return Err(self.named(&problem, error, threads));
@@ -56,7 +56,7 @@ impl Calibration {
         let found = self.of_parameters(&normal, &problem, threads)?;
         let (log_determinant, cofactors) = found.ok_or_else(undetermined)?;
         Ok(Correction {
-            parameters: normal.reduced_corrections(layout),
+            parameters: normal.factor.reduced_corrections(layout),
             cofactors,
             log_determinant,
             without_effect: parameters_of(&problem, idle),
