@@ -248,7 +248,7 @@ RADII = 9  # Rows of a distortion curve
 
 
 def cameras_section(result: Result, drawings: Sequence[Drawing]) -> Section:
-    found = calibrations(result)
+    found = result._calibrations
     shown, note = found[:LISTED], about("cameras.others")
     law = "Student" if result.unit_variance != "unity" and result.variance_of_unit_weight else "normal"
     tables = [parameters_table(each, law) for each in shown]

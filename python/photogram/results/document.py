@@ -14,7 +14,7 @@ from photogram.network.structuring import structure
 from photogram.results import network_document as of_network
 from photogram.results import network_sections as sections
 from photogram.results import tables as declared
-from photogram.results.calibration import calibration_member, calibrations, cameras_section
+from photogram.results.calibration import calibration_member, cameras_section
 from photogram.results.datum import observed_control
 from photogram.results.features import features_members, features_section
 from photogram.results.film_report import films_section
@@ -174,7 +174,7 @@ def _members(result: Result) -> dict[str, Any]:
             | {"parameters": records(declared.camera_parameters([each]))}
             for each in result.cameras
         ]
-        found["calibrations"] = [calibration_member(result, each) for each in calibrations(result)]
+        found["calibrations"] = [calibration_member(result, each) for each in result._calibrations]
     if result.unknowns:
         found["unknowns"] = [
             members(each, *of_unknown, *of_weight, matrix="attitude", sd_given="given.deviations")

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from photogram import Features
     from photogram.io.writing import Content
     from photogram.plots.picture_data import Pictured
+    from photogram.results.calibration import Calibration
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.parts import Terms
     from photogram.results.reliability_summary import ReliabilitySummary
@@ -213,6 +214,12 @@ class Result(OnFilm, AdjustedNetwork):
         from photogram.results.network_tables import block_terms
 
         return block_terms(self)
+
+    @cached_property
+    def _calibrations(self) -> list[Calibration]:
+        from photogram.results.calibration import calibrations
+
+        return calibrations(self)
 
     def _plot_data(self) -> Pictured:
         from photogram.results.picture_data import PicturedBlock
