@@ -183,7 +183,9 @@ class Hypotheses:
             ),
             **dict.fromkeys(("attitude", "boresight", "control-rotation"), "rad"),
             **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
-            **dict.fromkeys(("camera-affinity", "camera-radial", "camera-size", "distance-scale", *SHARES), ""),
+            **dict.fromkeys(
+                ("camera-affinity", "camera-radial", "camera-size", "distance-scale", *SHARES), ""
+            ),
             **dict.fromkeys(("time-offset", "readout-time", "readout-time-columns"), self.times),
         }
         return f" {units.get(str(self.code[row]), unit_written(self.axes[2].small))}".rstrip()
@@ -421,7 +423,7 @@ class Hypotheses:
     def external_reliability(self, rows: Indices | None = None) -> Table:
         """Return the declared table of undetected errors and their effects, of all hypotheses or of some."""
         rows = np.arange(len(self.code)) if rows is None else rows
-        none = Effect(np.empty((0, 3)), False, 0, 0, math.nan, None, math.nan)
+        none = Effect(np.empty((0, 3)), 0, 0, math.nan, None, math.nan)
         effects = [self.effects.get(row, none) for row in rows.tolist()]
         ids = self.suspects.given.point_ids
         at = [each.at and f"{self.axes[each.at[1]].name} of {ids[each.at[0]]}" for each in effects]
