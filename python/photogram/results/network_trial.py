@@ -450,8 +450,8 @@ def block_facts(block: Block, places: Floats) -> Facts:
     if len(strips) > MOST_SETS:
         chosen = suspected_strips([observed[strip] - places[strip] for strip in strips])
     if len(chosen) > 1:
-        place = {strip: number for number, strip in enumerate(chosen)}  # Sets have consecutive numbers
-        facts |= {"position_sets": [place.get(strip) for strip in sets.tolist()], "strips": chosen}
+        consecutive = {strip: place for place, strip in enumerate(chosen)}
+        facts |= {"position_sets": [consecutive.get(strip) for strip in sets.tolist()], "strips": chosen}
     held = np.isfinite(block.point_sd)
     control = np.flatnonzero(held.any(axis=1))
     # Coordinates without standard deviation may be unknown.
