@@ -679,8 +679,46 @@ fn what_the_equations_do_not_determine_is_named() {
     let system = System::new(layout, Ordering::ReverseCuthillMckee).unwrap();
     let factor = done(system.factor(&threads(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
     let deficiency = factor.deficiency().unwrap();
-    assert_eq!(deficiency.defect(), 1);
     assert_eq!(deficiency.blocks(), vec![vec![3]]);
+}
+
+/// Differences of consecutive unknowns in chains of [`Chains::LENGTH`].
+struct Chains;
+
+impl Chains {
+    const LENGTH: usize = 30;
+}
+
+impl Equations for Chains {
+    fn write(&self, _: usize, _: usize, _: &mut GroupRows<'_>) {}
+
+    fn write_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+        let weight = if tie % 3 == 0 { 10.0 } else { 1.0 };
+        rows.constant[0] = 0.0;
+        rows.coefficients.copy_from_slice(&[-weight, weight]);
+    }
+}
+
+#[test]
+fn many_doubtful_pivots_are_told_from_lost_ones() {
+    // Weak weights determine every other chain; the last pivots of all chains are small.
+    let chains = 2 * 700;
+    let unknowns = chains * Chains::LENGTH;
+    let ends = (0..unknowns as u32 - 1).filter(|k| (*k as usize + 1) % Chains::LENGTH > 0);
+    let ties = ends.map(|k| Tie { rows: 1, local: None, retained: vec![k, k + 1] }).collect();
+    let layout = Layout::new(1, 1, &vec![1; unknowns], vec![0], vec![]).unwrap().with_ties(ties).unwrap();
+    let mut prior = Prior { weight: vec![0.0; unknowns], right: vec![0.0; unknowns], between: vec![] };
+    prior.weight.iter_mut().step_by(2 * Chains::LENGTH).for_each(|weight| *weight = 1e-9);
+    let chain = |chain: usize| (chain * Chains::LENGTH..(chain + 1) * Chains::LENGTH).collect();
+    let expected: Vec<Vec<usize>> = (0..chains).skip(1).step_by(2).map(chain).collect();
+    let system = System::new(layout, Ordering::Auto).unwrap();
+    for count in [1, 3] {
+        let options = FactorOptions::default();
+        let factor = done(system.factor(&threads(count), &Chains, &prior, &options, &mut go));
+        let mut found = factor.deficiency().unwrap().blocks();
+        found.sort();
+        assert_eq!(found, expected);
+    }
 }
 
 #[test]

@@ -18,38 +18,34 @@ pub struct Deficiency<'a> {
 }
 
 impl Deficiency<'_> {
-    /// Number of undetermined combinations.
-    pub fn defect(&self) -> usize {
-        self.factor.lost.len()
-    }
-
     /// Returns the retained blocks in each null vector, ascending: shares of at least 1 % of the largest. Unknowns are scaled by the
     /// precision from their own equations alone.
     pub fn blocks(&self) -> Vec<Vec<usize>> {
-        let symbolic = &*self.factor.panels.symbolic;
-        let vectors = self.factor.lost.iter().map(|&pivot| {
-            let mut vector = self.factor.combination(pivot);
-            self.factor.scale(&mut vector);
-            blocks_moved(symbolic, &vector)
-        });
-        vectors.collect()
+        self.each(|vector| {
+            self.factor.scale(vector);
+            blocks_moved(&self.factor.panels.symbolic, vector)
+        })
     }
 
     /// Returns the unknowns in each null vector, ascending: shares of at least one tenth of the largest.
     pub fn unknowns(&self, layout: &Layout) -> Vec<Vec<usize>> {
-        let Factor { lost, .. } = self.factor;
-        lost.iter().map(|&pivot| self.factor.taking_part(layout, self.factor.combination(pivot))).collect()
+        self.each(|vector| self.factor.taking_part(layout, vector))
     }
 
     /// Returns all unknowns of each null vector, as (unknown, component x, diagonal element n of the normal equations). The product x^2 n
     /// is the sum of squares that the unknown's own equations assign to this change.
     pub fn combinations(&self, layout: &Layout) -> Vec<Vec<(usize, f64, f64)>> {
-        let Factor { lost, diagonal, .. } = self.factor;
-        let combination = |&pivot: &usize| {
-            let moved = self.factor.combination(pivot).into_iter().zip(diagonal);
-            self.factor.unknowns(layout).zip(moved).map(|(unknown, (x, &n))| (unknown, x, n)).collect()
-        };
-        lost.iter().map(combination).collect()
+        self.each(|vector| {
+            let moved = vector.iter().zip(&self.factor.diagonal);
+            self.factor.unknowns(layout).zip(moved).map(|(unknown, (&x, &n))| (unknown, x, n)).collect()
+        })
+    }
+
+    /// Returns the results for all null vectors.
+    fn each<T>(&self, of: impl Fn(&mut [f64]) -> T) -> Vec<T> {
+        let mut found = vec![];
+        self.factor.each_combination(&self.factor.lost, |_, vector| found.push(of(vector)));
+        found
     }
 }
 

@@ -42,8 +42,8 @@ pub fn take_product_buffers() {
 pub(super) struct Pivots {
     /// Pivots that are lost in rounding errors: set to one, with zeros below.
     pub lost: Vec<usize>,
-    /// Pivots so small compared with the diagonal that they may be rounding errors.
-    pub doubtful: Vec<usize>,
+    /// Pivots so small compared with the diagonal that they may be rounding errors, each behind its ratio to the diagonal.
+    pub doubtful: Vec<(f64, usize)>,
 }
 
 /// Ratio of a pivot to its initial diagonal element below which it is doubtful.
@@ -163,7 +163,7 @@ impl Kernel for Cholesky<'_> {
             if !regular {
                 self.pivots.lost.push(self.first + j);
             } else if pivot * pivot < DOUBTFUL * self.diagonal[j] {
-                self.pivots.doubtful.push(self.first + j);
+                self.pivots.doubtful.push((pivot * pivot / self.diagonal[j], self.first + j));
             }
         }
     }

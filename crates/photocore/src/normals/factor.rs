@@ -54,8 +54,8 @@ pub struct Factor {
     pub(super) diagonal: Vec<f64>,
     /// Lost pivots, in elimination order.
     pub(super) lost: Vec<usize>,
-    /// Pivots that may be rounding errors.
-    doubtful: Vec<usize>,
+    /// Pivots that may be rounding errors, each behind its ratio to the diagonal.
+    doubtful: Vec<(f64, usize)>,
     /// Sum of squares of the right-hand sides of all equations, without priors.
     pub sum_of_squares: f64,
     /// Predicted decrease of the sum of squares by a full step, including priors and all unknowns.
@@ -77,7 +77,7 @@ struct Update {
 struct Visited {
     sums: Sums,
     lost: Vec<usize>,
-    doubtful: Vec<usize>,
+    doubtful: Vec<(f64, usize)>,
     /// Parts of L^-1 n and of the diagonal for the eliminated blocks.
     right: Vec<f64>,
     diagonal: Vec<f64>,
@@ -88,6 +88,15 @@ struct Visited {
 /// Threshold for an undetermined combination of unknowns: its information relative to the equations of each unknown alone. Rounding errors
 /// are less than one unit in the last digit. Priors that only define the datum (GIANT's default of 60000 m for a station) give a hundred.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// Number of combinations that are computed together.
+const TOGETHER: usize = 16;
+
+/// Maximum number of doubtful pivots that are tested: those with the smallest ratio to their diagonal elements.
+const MOST_DOUBTFUL: usize = 32 * TOGETHER;
+
+/// Maximum number of factorisations without lost pivots. Each reveals further combinations, because columns after a lost pivot are invalid.
+const MOST_PASSES: usize = 8;
 
 impl System {
     /// Forms the normal equations, eliminates the local blocks and factors the rest. Results are bitwise identical for any number of
@@ -110,11 +119,12 @@ impl System {
         let factored = watched(threads, between, |control| {
             let caches = cached && self.caches;
             let formation = Formation { system: self, equations, prior, damping, caches, control };
-            let mut given_up = Vec::new();
+            let (mut given_up, mut passes) = (Vec::new(), 0);
             loop {
                 let factor = formation.factor(&given_up)?;
-                if control.stopped() {
-                    // Supernodes were skipped, and the factor is invalid.
+                passes += 1;
+                if passes == MOST_PASSES || control.stopped() {
+                    // After a stop supernodes were skipped, and the factor is invalid.
                     return Some(factor);
                 }
                 let lost = factor.lost_after_all();
@@ -227,7 +237,7 @@ impl Formation<'_> {
         Some(Visited {
             sums,
             lost: pivots.lost.into_iter().map(|column| first + column).collect(),
-            doubtful: pivots.doubtful.into_iter().map(|column| first + column).collect(),
+            doubtful: pivots.doubtful.into_iter().map(|(ratio, column)| (ratio, first + column)).collect(),
             right,
             diagonal,
             formation,
@@ -312,7 +322,7 @@ impl Factor {
     /// the precision from their own equations alone.
     pub fn moved(&self, system: &System, solution: &[f64]) -> Vec<usize> {
         let unknowns = self.unknowns(&system.layout).map(|unknown| solution[unknown]);
-        self.taking_part(&system.layout, unknowns.collect())
+        self.taking_part(&system.layout, &mut unknowns.collect::<Vec<f64>>())
     }
 
     /// Returns the largest share of a retained unknown in a solution, scaled by the precision from its own equations alone.
@@ -323,10 +333,10 @@ impl Factor {
     }
 
     /// Returns the unknowns with large shares in a vector over the retained unknowns in elimination order.
-    pub(super) fn taking_part(&self, layout: &Layout, mut vector: Vec<f64>) -> Vec<usize> {
-        self.scale(&mut vector);
+    pub(super) fn taking_part(&self, layout: &Layout, vector: &mut [f64]) -> Vec<usize> {
+        self.scale(vector);
         let largest = vector.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-        let shares = self.unknowns(layout).zip(&vector);
+        let shares = self.unknowns(layout).zip(&*vector);
         let mut found: Vec<usize> =
             shares.filter(|(_, value)| value.abs() >= 0.1 * largest).map(|(unknown, _)| unknown).collect();
         found.sort_unstable();
@@ -377,19 +387,27 @@ impl Factor {
     /// pivot itself is not conclusive: if the combination hardly changes its unknown, a large fraction of the diagonal element is rounding
     /// error.
     fn lost_after_all(&self) -> Vec<usize> {
-        let is_lost = |&pivot: &usize| {
-            let x = self.combination(pivot);
+        let mut doubtful: Vec<(f64, usize)> = self.doubtful.clone();
+        doubtful.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        doubtful.truncate(MOST_DOUBTFUL);
+        let mut pivots: Vec<usize> = doubtful.into_iter().map(|(_, pivot)| pivot).collect();
+        pivots.sort_unstable();
+        let mut lost = vec![];
+        self.each_combination(&pivots, |pivot, x| {
             let separately: f64 = x.iter().zip(&self.diagonal).map(|(x, n)| x * x * n).sum();
-            separately.recip() < ROUNDING
-        };
-        self.doubtful.iter().copied().filter(is_lost).collect()
+            lost.extend((separately.recip() < ROUNDING).then_some(pivot));
+        });
+        lost
     }
 
-    /// Returns L^-T e: the combination of unknowns of a pivot.
-    pub(super) fn combination(&self, pivot: usize) -> Vec<f64> {
-        let mut x = vec![0.0; self.right.len()];
-        x[pivot] = 1.0;
-        self.solve_backward(&mut x);
-        x
+    /// Calls `take` with some pivots, ascending, and L^-T e of each: its combination of unknowns.
+    pub(super) fn each_combination(&self, pivots: &[usize], mut take: impl FnMut(usize, &mut [f64])) {
+        let count = self.right.len().max(1);
+        for together in pivots.chunks(TOGETHER) {
+            let mut columns = vec![0.0; together.len() * count];
+            together.iter().enumerate().for_each(|(k, pivot)| columns[k * count + pivot] = 1.0);
+            self.backward_columns(&mut columns);
+            together.iter().zip(columns.chunks_exact_mut(count)).for_each(|(&pivot, x)| take(pivot, x));
+        }
     }
 }
