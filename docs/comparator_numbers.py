@@ -10,7 +10,6 @@ from textwrap import wrap
 import numpy as np
 
 from photogram import comparator
-from photogram.comparator.calibration import adjusted_grid, corrected_grid
 from photogram.comparator.fits import fit_rigid
 from photogram.comparator.listing.parameters import combined_linear_page, variance_lines
 from photogram.comparator.simulation import simulated_years
@@ -67,8 +66,8 @@ def grid_lines() -> list[str]:
         f"equation 64  {result.text_um:.3f} um",
         f"unbiased     {result.unbiased_um:.3f} um",
         f"a priori     {calibration().session.grids[1320].sigma_um:.3f} um",
-        f"coordinates corrected by averages            {corrected_grid(calibration(), 1320).sigma_um:.3f} um",
-        f"coordinates corrected by joint adjustment    {adjusted_grid(calibration(), 1320).sigma_um:.3f} um",
+        f"coordinates corrected by averages            {calibration().corrected_grid(1320).sigma_um:.3f} um",
+        f"coordinates corrected by joint adjustment    {calibration().adjusted_grid(1320).sigma_um:.3f} um",
     ]
 
 

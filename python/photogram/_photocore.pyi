@@ -1460,11 +1460,11 @@ class NetworkTrial:
         `redundancy` r, `noncentrality`, `bias_to_noise`; `estimate`, `plausible` (sizes) and `mdb`: (h, k)
         with NaN for missing values. `effects` by row: points beyond the limit, points other than those of the
         group that the largest undetected error moves so far, the largest change in standard deviations, its
-        point and coordinate, the largest change, and the changes of `checks`. `sets`: dictionaries with `parameters`, `plausible`, `estimate`, its
-        `cofactors`, `error`, `sd_between_photos` (standard deviation of a significant readout time if it
-        differs between photos; else None), and the changes of check points by each parameter, (c, 3, k)
-        row by row; `groups`: the same by row of groups with effects, if `by_component`. `correlations`:
-        (s, s), of the scores of sets.
+        point and coordinate, the largest change, and the changes of `checks`. `sets`: dictionaries with
+        `parameters`, `plausible`, `estimate`, its `cofactors`, `error`, `sd_between_photos` (standard
+        deviation of a significant readout time if it differs between photos; else None), and the changes of
+        check points by each parameter, (c, 3, k) row by row; `groups`: the same by row of groups with
+        effects, if `by_component`. `correlations`: (s, s), of the scores of sets.
         """
 
     def effects(self, suspects: list[int]) -> _Floats:

@@ -23,7 +23,6 @@ from photogram.comparator import (
     to_cards,
     to_csv,
 )
-from photogram.comparator.calibration import corrected_grid
 from photogram.comparator.cards import join_least_count
 from photogram.comparator.case import close_out, detect_orientation, intersect_legs, reduce_legs
 from photogram.comparator.pointing import group, group_as_listed
@@ -206,7 +205,7 @@ def test_plates_expand_with_their_temperature(tmp_path):
     plain = calibrate(made, QUICK)
     assert found.correction.scale_x / plain.correction.scale_x - 1 == pytest.approx(4 * 8e-6, rel=1e-3)
     assert found.correction.identity.temperature_c == 24.0
-    assert corrected_grid(found, 1).temperature_c == 24.0
+    assert found.corrected_grid(1).temperature_c == 24.0
     assert not [each for each in found.messages if each.code == "comparators.expansion"]
     unsaid = calibrate(replace(made, temperature_c=24.0), QUICK)
     assert described(unsaid.messages[0]).startswith("comparators.expansion plate=1 missing=its")

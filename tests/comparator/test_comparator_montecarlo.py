@@ -7,7 +7,6 @@ import pytest
 from plates import QUICK, STRAIGHT, bent, noisy
 
 from photogram.comparator import Grid, Options, calibrate, simulate_calibration
-from photogram.comparator.calibration import adjusted_grid, corrected_grid
 from photogram.comparator.correction import partials_of
 
 RUNS = 240
@@ -165,7 +164,7 @@ def test_corrected_grids_say_their_own_uncertainty():
             Grid.square(sigma_um=0.4), bent(), pointing_um=0.5, random_um=0.6, grid_um=0.4, seed=seed
         )
         calibration = calibrate(made.session)
-        grids = {"averages": corrected_grid(calibration, 1), "joint": adjusted_grid(calibration, 1)}
+        grids = {"averages": calibration.corrected_grid(1), "joint": calibration.adjusted_grid(1)}
         true = made.session.grids[1].xy_um + made.grid_errors_um
         for name, grid in grids.items():
             off[name].append(float(((grid.xy_um - true) ** 2).mean() / grid.sigma_um**2))

@@ -96,15 +96,13 @@ def comparator(
 
 def _corrections(calibration: Calibration) -> dict[str, bytes]:
     """Return the files for corrections: corrections and corrected grids."""
-    from photogram.comparator.calibration import adjusted_grid, corrected_grid
-
     made = {"correction.json": calibration.correction.to_json()}
     if calibration.joint:
         made["correction-joint.json"] = calibration.joint.correction.to_json()
     for plate in calibration.plates:
-        made[f"grid-{plate}.csv"] = corrected_grid(calibration, plate).to_csv()
+        made[f"grid-{plate}.csv"] = calibration.corrected_grid(plate).to_csv()
         if calibration.joint:
-            made[f"grid-{plate}-joint.csv"] = adjusted_grid(calibration, plate).to_csv()
+            made[f"grid-{plate}-joint.csv"] = calibration.adjusted_grid(plate).to_csv()
     return made
 
 

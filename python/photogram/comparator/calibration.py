@@ -218,6 +218,24 @@ class Calibration(Documented, Judged):
         """Return the standard deviation of a grid coordinate: unbiased, or as published."""
         return self.plates[plate].sigma_um(as_published=self.options.as_published)
 
+    def corrected_grid(self, plate: int) -> Grid:
+        """Return a plate corrected by its final average residuals at measured points."""
+        session, averages = self.session, self.plates[plate].averages
+        placed = [case.placed for case in self.cases]
+        known = {number: grid.sigma_um for number, grid in session.grids.items()}
+        stage = self.nonlinear or self.linear
+        sigma = GridSigma(session.grids, placed, stage).corrected(plate, known)
+        corrections = averages.points, averages.corrections_um
+        return with_corrections(session.grids[plate], *corrections, sigma, _occasion(session))
+
+    def adjusted_grid(self, plate: int) -> Grid:
+        """Return a plate of the joint adjustment of given coordinates and measurements."""
+        assert self.joint is not None
+        session, joint = self.session, self.joint.plates[plate]
+        sigma = math.sqrt(float((joint.sd_um**2).mean()))
+        corrections = joint.points, joint.corrections_um
+        return with_corrections(session.grids[plate], *corrections, sigma, _occasion(session))
+
     def document(self) -> Document:
         """Return the document with analysis of variance, parameters, tests and plots."""
         from photogram.comparator.document import calibration_document
@@ -424,26 +442,6 @@ def _joint_check(session: Session, placed: Sequence[PlacedCase], linear: Combine
     joint = adjust_jointly(placed, session.grids, linear, fixed, polynomial=False).correction
     differences = np.abs(parameters_of(linear.correction) - parameters_of(joint))[:3]
     return float((differences / np.sqrt(np.diag(joint.covariance)[:3])).max())
-
-
-def corrected_grid(calibration: Calibration, plate: int) -> Grid:
-    """Return a plate corrected by its final average residuals at measured points."""
-    session, averages = calibration.session, calibration.plates[plate].averages
-    placed = [case.placed for case in calibration.cases]
-    known = {number: grid.sigma_um for number, grid in session.grids.items()}
-    stage = calibration.nonlinear or calibration.linear
-    sigma = GridSigma(session.grids, placed, stage).corrected(plate, known)
-    corrections = averages.points, averages.corrections_um
-    return with_corrections(session.grids[plate], *corrections, sigma, _occasion(session))
-
-
-def adjusted_grid(calibration: Calibration, plate: int) -> Grid:
-    """Return a plate of the joint adjustment of given coordinates and measurements."""
-    assert calibration.joint is not None
-    session, joint = calibration.session, calibration.joint.plates[plate]
-    sigma = math.sqrt(float((joint.sd_um**2).mean()))
-    corrections = joint.points, joint.corrections_um
-    return with_corrections(session.grids[plate], *corrections, sigma, _occasion(session))
 
 
 def _occasion(session: Session) -> str:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.comparator.calibration import adjusted_grid
 from photogram.comparator.joint import JointFit
 from photogram.comparator.pictures import plotters
 from photogram.comparator.pointing import Precision
@@ -132,7 +131,7 @@ def _joint(calibration: Calibration) -> list[Part]:
     if calibration.nonlinear and polynomial:
         parts.append(coefficients(polynomial, joint.sigma0**2, "joint_coefficients"))
     return parts + [
-        plate_points(adjusted_grid(calibration, plate), own.points, own.corrections_um, own.sd_um)
+        plate_points(calibration.adjusted_grid(plate), own.points, own.corrections_um, own.sd_um)
         for plate, own in joint.plates.items()
     ]
 
