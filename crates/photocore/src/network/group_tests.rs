@@ -1,11 +1,9 @@
 //! Tests of all observation groups in outlier detection.
 
-use std::ops::Range;
-
 use nalgebra::{DMatrix, DVector};
 
 use super::error::NetworkError;
-use super::suspects::{Home, Row, Suspect};
+use super::suspects::{Home, Row, Suspect, Suspects};
 use super::trial::Trial;
 use crate::adjustment::{Alone, Few, GroupTest, Leverages, Terms, weighted};
 use crate::normals::Function;
@@ -37,41 +35,76 @@ pub struct Tests {
 /// Number of groups per chunk.
 const TOGETHER: usize = 1024;
 
+/// Unwritten part of [`Tests`] for consecutive groups.
+struct Part<'a> {
+    active: &'a mut [bool],
+    rank: &'a mut [usize],
+    /// Statistic, least and shared.
+    of_suspects: [&'a mut [f64]; 3],
+    /// Residual, error and its standard deviation.
+    of_rows: [&'a mut [f64]; 3],
+    cofactors: &'a mut [f64],
+}
+
 impl Tests {
-    /// Adds the test of the next group with `size` rows; None if it is inactive.
-    fn push(&mut self, size: usize, tested: Option<Tested>) {
-        self.active.push(tested.is_some());
-        let test = tested.as_ref().map(|tested| &tested.test);
-        self.rank.push(test.map_or(0, |test| test.rank));
-        self.statistic.push(test.map_or(f64::NAN, |test| test.statistic));
-        self.least.push(test.map_or(f64::NAN, |test| test.least));
-        self.shared.push(test.map_or(f64::NAN, |test| test.shared));
-        let of_rows = [&mut self.residual, &mut self.error, &mut self.error_sd].into_iter();
-        if let Some(Tested { residual, cofactors, error, error_sd, .. }) = tested {
-            of_rows.zip([residual, error, error_sd]).for_each(|(all, own)| all.extend_from_slice(&own));
-            self.cofactors.extend_from_slice(&cofactors);
-        } else {
-            of_rows.for_each(|all| all.resize(all.len() + size, f64::NAN));
-            self.cofactors.resize(self.cofactors.len() + size * size, 0.0);
+    /// Returns tests of inactive groups.
+    fn unknown(suspects: &Suspects) -> Self {
+        let count = suspects.len();
+        let (rows, blocks) = (suspects.row_starts()[count], suspects.block_starts()[count]);
+        let nothing = |count: usize| vec![f64::NAN; count];
+        Self {
+            active: vec![false; count],
+            rank: vec![0; count],
+            statistic: nothing(count),
+            least: nothing(count),
+            shared: nothing(count),
+            residual: nothing(rows),
+            cofactors: vec![0.0; blocks],
+            error: nothing(rows),
+            error_sd: nothing(rows),
         }
     }
 
-    /// Joins the tests of consecutive groups, column by column.
-    fn joined(mut parts: Vec<Self>) -> Self {
-        fn column<T: Clone>(parts: &mut [Tests], of: fn(&mut Tests) -> &mut Vec<T>) -> Vec<T> {
-            parts.iter_mut().map(|part| std::mem::take(of(part))).collect::<Vec<_>>().concat()
-        }
-        Self {
-            active: column(&mut parts, |own| &mut own.active),
-            rank: column(&mut parts, |own| &mut own.rank),
-            statistic: column(&mut parts, |own| &mut own.statistic),
-            least: column(&mut parts, |own| &mut own.least),
-            shared: column(&mut parts, |own| &mut own.shared),
-            residual: column(&mut parts, |own| &mut own.residual),
-            cofactors: column(&mut parts, |own| &mut own.cofactors),
-            error: column(&mut parts, |own| &mut own.error),
-            error_sd: column(&mut parts, |own| &mut own.error_sd),
-        }
+    /// Splits the tests into chunks of [`TOGETHER`] groups.
+    fn parts<'a>(&'a mut self, suspects: &Suspects) -> Vec<Part<'a>> {
+        let (row_starts, block_starts) = (suspects.row_starts(), suspects.block_starts());
+        let Self { active, rank, statistic, least, shared, residual, cofactors, error, error_sd } = self;
+        let of_suspects = [statistic, least, shared].map(|all| all.chunks_mut(TOGETHER));
+        let [mut statistic, mut least, mut shared] = of_suspects;
+        let mut of_rows = [residual, error, error_sd].map(|all| &mut all[..]);
+        let mut cofactors = &mut cofactors[..];
+        let of_part = |(first, (active, rank)): (usize, (&'a mut [bool], &'a mut [usize]))| {
+            let (first, last) = (first * TOGETHER, first * TOGETHER + active.len());
+            let rows = row_starts[last] - row_starts[first];
+            let of_suspects = [&mut statistic, &mut least, &mut shared];
+            Part {
+                of_suspects: of_suspects.map(|chunks| chunks.next().unwrap_or_default()),
+                of_rows: of_rows.each_mut().map(|rest| rest.split_off_mut(..rows).unwrap_or_default()),
+                cofactors: cofactors
+                    .split_off_mut(..block_starts[last] - block_starts[first])
+                    .unwrap_or_default(),
+                active,
+                rank,
+            }
+        };
+        active.chunks_mut(TOGETHER).zip(rank.chunks_mut(TOGETHER)).enumerate().map(of_part).collect()
+    }
+}
+
+impl Part<'_> {
+    /// Writes the test of the next group with `size` rows.
+    fn put(&mut self, size: usize, tested: Option<Tested>) {
+        let (active, rank) = (self.active.split_off_first_mut(), self.rank.split_off_first_mut());
+        let own = self.of_suspects.each_mut().map(|rest| rest.split_off_first_mut());
+        let rows = self.of_rows.each_mut().map(|rest| rest.split_off_mut(..size).unwrap_or_default());
+        let block = self.cofactors.split_off_mut(..size * size).unwrap_or_default();
+        let Some(Tested { test, residual, cofactors, error, error_sd }) = tested else { return };
+        active.into_iter().for_each(|to| *to = true);
+        rank.into_iter().for_each(|to| *to = test.rank);
+        let of_test = [test.statistic, test.least, test.shared];
+        own.into_iter().zip(of_test).for_each(|(to, value)| to.into_iter().for_each(|to| *to = value));
+        rows.into_iter().zip([residual, error, error_sd]).for_each(|(to, own)| to.copy_from_slice(&own));
+        block.copy_from_slice(&cofactors);
     }
 }
 
@@ -94,17 +127,16 @@ impl Trial {
         let groups = found.cofactors.groups.as_deref().ok_or(NetworkError::State)?;
         let terms = self.terms(&self.assembled.problem.sd, &found.values);
         let alone = shared.then(|| found.alone(&self.assembled.problem, threads));
-        let fill = |some: Range<usize>| {
-            let mut part = Tests::default();
-            for suspect in some.map(|index| self.suspects.get(index)) {
-                let tested = self.test(&suspect, (found, groups), &terms, alone.as_ref());
-                part.push(suspect.rows.len(), tested);
+        let mut all = Tests::unknown(&self.suspects);
+        let parts = all.parts(&self.suspects);
+        let fill = |number: usize, mut part: Part<'_>| {
+            for index in TOGETHER * number..(TOGETHER * (number + 1)).min(self.suspects.len()) {
+                let suspect = self.suspects.get(index);
+                part.put(suspect.rows.len(), self.test(&suspect, (found, groups), &terms, alone.as_ref()));
             }
-            part
         };
-        let count = self.suspects.len();
-        let parts = (0..count).step_by(TOGETHER).map(|first| first..count.min(first + TOGETHER)).collect();
-        Ok(Tests::joined(threads.install(|| parallel::map_each(parts, &fill))))
+        threads.install(|| parallel::each_of(parts, &fill));
+        Ok(all)
     }
 
     /// Returns the redundancy numbers of all rows: the diagonals of their cofactors; NaN for excluded rows.
@@ -257,7 +289,7 @@ impl Trial {
         Ok(suspect.rows.iter().map(of).collect())
     }
 
-    pub(super) fn unknowns_at(&self, home: Home) -> Range<usize> {
+    pub(super) fn unknowns_at(&self, home: Home) -> std::ops::Range<usize> {
         let model = &self.assembled.problem.model;
         match home {
             Home::Point(place) => model.of_point(place),
