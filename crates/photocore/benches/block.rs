@@ -259,6 +259,7 @@ fn adjust(criterion: &mut Criterion) {
         reserved: 0,
         minimum: None,
         screens: Screens::default(),
+        photo_corrections: false,
     };
     let adjust = |block: &Network| block.adjustment(&options).on(&threads).run().expect("a determined block");
     let shared = with_shared_camera(&block);

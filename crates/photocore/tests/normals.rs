@@ -693,7 +693,7 @@ impl Equations for Chains {
     fn write(&self, _: usize, _: usize, _: &mut GroupRows<'_>) {}
 
     fn write_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
-        let weight = if tie % 3 == 0 { 10.0 } else { 1.0 };
+        let weight = if tie.is_multiple_of(3) { 10.0 } else { 1.0 };
         rows.constant[0] = 0.0;
         rows.coefficients.copy_from_slice(&[-weight, weight]);
     }
@@ -704,7 +704,7 @@ fn many_doubtful_pivots_are_told_from_lost_ones() {
     // Weak weights determine every other chain; the last pivots of all chains are small.
     let chains = 2 * 700;
     let unknowns = chains * Chains::LENGTH;
-    let ends = (0..unknowns as u32 - 1).filter(|k| (*k as usize + 1) % Chains::LENGTH > 0);
+    let ends = (0..unknowns as u32 - 1).filter(|k| !(*k as usize + 1).is_multiple_of(Chains::LENGTH));
     let ties = ends.map(|k| Tie { rows: 1, local: None, retained: vec![k, k + 1] }).collect();
     let layout = Layout::new(1, 1, &vec![1; unknowns], vec![0], vec![]).unwrap().with_ties(ties).unwrap();
     let mut prior = Prior { weight: vec![0.0; unknowns], right: vec![0.0; unknowns], between: vec![] };
