@@ -165,8 +165,8 @@ def _of_set(survey: Survey, size: float) -> Survey:
 
 
 def _resized(survey: Survey, size: float) -> np.ndarray:
-    """Return changes of images that were resized: another principal point, by `size`, and distance."""
-    return survey.xy * (size / math.hypot(WIDTH / 2, HEIGHT / 2))
+    """Return changes of images that were resized by a share `size`."""
+    return survey.xy * size
 
 
 def _images(change: Callable[[Survey, float], np.ndarray]) -> Mistake:
@@ -188,7 +188,7 @@ def _readout(survey: Survey, size: float, axis: int = 1) -> np.ndarray:
     change = np.zeros_like(survey.xy)
     for photo, pose in enumerate(survey.poses):
         velocity = _velocity(survey, photo)
-        own = (survey.photos == photo) & (survey.cameras is None or survey.cameras[photo] == 0)
+        own = survey.photos == photo
         seconds = size * (survey.xy[own, axis] / (WIDTH, HEIGHT)[axis] - 0.5)
         moved = [
             pixels(np.concatenate([pose[:3] + velocity * t, pose[3:]]), survey.points[[k]])[0]
@@ -365,7 +365,7 @@ MISTAKES: dict[str, tuple[str, Condition, Mistake]] = {
         lambda s: s.k is not None,
         lambda s, d: replace(s, k=(s.k or 0.0) + d),
     ),
-    "resized images": ("camera-point", lambda s: True, _images(_resized)),
+    "resized images": ("camera-size", lambda s: True, _images(_resized)),
     "rolling shutter by columns": (
         "readout-time-columns",
         lambda s: not s.close,
@@ -467,6 +467,7 @@ GIVEN = {
     "control-rotation": 0.005,
     "camera-f": 36.0,
     "camera-point": 20.0,
+    "camera-size": 0.005,
     "photo": 20.0,
     "camera-radial": 0.005,
     "camera-affinity": 1e-3,

@@ -120,6 +120,8 @@ def is_cause(result: Result, hypothesis: str, single: str) -> bool | None:
             for each in line.fields["others"]
         ]
         true, first = hypothesis.partition(" ")[0], named[0]
+        if true == "control-point" and "fixed-point" in named:  # Fixed, and the end of a distance
+            return True
         largest: dict[str, float] = defaultdict(float)
         statistics = result.reliability_summary.hypotheses.statistic
         for code, statistic in zip(codes_of(result), statistics.tolist(), strict=True):
