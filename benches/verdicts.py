@@ -28,7 +28,7 @@ from surveys import Survey, aerial, surveys
 
 WRONG = 5.0  # Standard deviations by which a mistake moves points of a wrong result
 SIZES = 0.5, 1.0, 3.0, 10.0  # of planted errors, in minimal detectable biases
-LENS = "camera-f", "camera-point", "camera-term", "camera-radial"
+LENS = "camera-f", "camera-point", "camera-size", "camera-term", "camera-radial"
 
 
 def codes_of(result: Result) -> np.ndarray:
