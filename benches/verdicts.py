@@ -4,8 +4,8 @@ Further options: `--snoop` removes gross errors, `--loss huber` or `cauchy` adju
 counts results as accepted whose exit code is 0 with `--strict`, `--only TEXT` selects mistakes by name,
 `--large` has one flight of 500 photos, `--table` prints which mistakes plant each code of the catalogue.
 
-Blocks with one practical mistake each (`mistakes.py`) are adjusted, and the verdict is compared with the
-truth: a result is wrong if the mistake has moved two other points by more than 5 standard deviations. No
+Blocks with one practical mistake each (`planted_mistakes.py`) are adjusted, and the verdict is compared with
+the truth: a result is wrong if the mistake moved two other points by more than 5 standard deviations. No
 block may be accepted without reserve then. The blocks come from a generator that uses numpy only and not the
 simulator of the package (`surveys.py`): `--blocks` of them are controlled by points or positions, and one of
 another datum follows each. The same noise is adjusted with and without the mistake, so that the difference is
@@ -22,8 +22,8 @@ from typing import Any
 
 import numpy as np
 
-from mistakes import ACCURACY, GIVEN, LARGEST, MISTAKES, TWICE, target
 from photogram import PhotogramError, Result, adjust, snoop
+from planted_mistakes import ACCURACY, GIVEN, LARGEST, MISTAKES, TWICE, target
 from surveys import Survey, aerial, surveys
 
 WRONG = 5.0  # Standard deviations by which a mistake moves points of a wrong result
