@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -236,11 +237,15 @@ class Calibration(Documented, Judged):
         corrections = joint.points, joint.corrections_um
         return with_corrections(session.grids[plate], *corrections, sigma, _occasion(session))
 
-    def document(self) -> Document:
-        """Return the document with analysis of variance, parameters, tests and plots."""
+    @cached_property
+    def _document(self) -> Document:
         from photogram.comparator.document import calibration_document
 
         return calibration_document(self)
+
+    def document(self) -> Document:
+        """Return the document with analysis of variance, parameters, tests and plots."""
+        return self._document  # Listing, summary and JSON of a command share it
 
     def _findings(self) -> Findings:
         from photogram.comparator.document import comparator_findings

@@ -15,13 +15,12 @@ from photogram.results.hypotheses import DETECTION, SHARES, WHOLE, Effect, Hypot
 from photogram.results.hypothesis_checks import Joint, single_checks, with_checks
 from photogram.results.network_trial import (
     IMAGE,
-    MEDIAN,
     NO_FACTS,
-    NOTABLE,
     Facts,
     NamedSuspects,
     NetworkTrial,
     Tests,
+    notable,
 )
 from photogram.show.quantity import Axis
 from photogram.statistics.findings import ALTERNATIVES, Tested
@@ -157,19 +156,16 @@ def hypotheses(
 def shifted_photos(suspects: NamedSuspects, tests: Tests) -> list[int]:
     """Return photos that may have an error in common of all their images; of few photos all.
 
-    Of many, these are the photos with the largest means of the residuals of an image axis. Their standard
-    deviations depend on the geometry: the limit is larger than the one of equal photos.
+    Of many, these are the photos with the largest means of the residuals of an image axis.
     """
     count, images = len(suspects.given.photo_ids), np.flatnonzero(suspects.kinds == IMAGE)
     if count <= ALL_PHOTOS:
         return [*range(count)]
-    photos, squares = suspects.photos[images], np.zeros(count)
+    photos = suspects.photos[images]
     numbers = np.maximum(np.bincount(photos, minlength=count), 1)
-    for residuals in np.nan_to_num(tests.residual[: 2 * len(images)]).reshape(-1, 2).T:
-        relative = np.bincount(photos, residuals, minlength=count) ** 2 / numbers
-        squares += MEDIAN * relative / max(float(np.median(relative)), np.finfo(float).tiny)
-    largest = np.argsort(-squares, kind="stable")[:MOST_PHOTOS]
-    return sorted(int(photo) for photo in largest if squares[photo] > NOTABLE + 4 * math.log(count))
+    residuals = np.nan_to_num(tests.residual[: 2 * len(images)]).reshape(-1, 2).T
+    sums = [np.bincount(photos, own, minlength=count) for own in residuals]
+    return notable(np.stack(sums, axis=1) ** 2 / numbers[:, np.newaxis], MOST_PHOTOS)
 
 
 def _groups(suspects: NamedSuspects, kinds: Indices, subjects: Indices) -> Indices:

@@ -371,7 +371,7 @@ Facts = dict[str, Any]  # See `NetworkTrial.hypotheses`
 
 MOST_SETS = 8  # Largest number of sets of positions or control that are all tested
 MOST_STRIPS = 4  # Of more strips, this number is tested: those with the largest mean differences
-NOTABLE = 20.0  # Least square of a mean of these, in medians, is larger by 4 ln n for n means
+NOTABLE = 20.0  # Least sum of squares of notable means, in medians; larger by 4 ln n for n means
 MEDIAN = 0.4549  # Of chi-square with one degree of freedom
 
 NO_FACTS: Facts = {
@@ -386,19 +386,23 @@ NO_FACTS: Facts = {
 }
 
 
-def suspected_strips(differences: Sequence[Floats]) -> list[int]:
-    """Return those of many strips whose positions have notable means of (k, 3) differences.
+def notable(squares: Floats, most: int, least: int = 1) -> list[int]:
+    """Return the rows of (n, k) squares of means that are larger than usual: `least` to `most`, or none.
 
-    The unit of their squares is the median of all strips.
+    The unit of each column is its median. Standard deviations of means depend on the geometry: the limit is
+    larger than the one of equal means.
     """
-    means = np.array([own.mean(axis=0) * math.sqrt(len(own)) for own in differences])
-    if not np.isfinite(means).all():
-        return []
-    usual = np.maximum(np.median(means**2, axis=0), np.finfo(float).tiny)
-    squares = MEDIAN * (means**2 / usual).sum(axis=1)
-    count = np.count_nonzero(squares > NOTABLE + 4 * math.log(len(squares)))
-    largest = np.argsort(-squares, kind="stable")[: min(max(count, 2), MOST_STRIPS)]
+    usual = np.maximum(np.median(squares, axis=0), np.finfo(float).tiny)
+    sums = MEDIAN * (squares / usual).sum(axis=1)
+    count = np.count_nonzero(sums > NOTABLE + 4 * math.log(len(sums)))
+    largest = np.argsort(-sums, kind="stable")[: min(max(count, least), most)]
     return sorted(largest.tolist()) if count else []
+
+
+def suspected_strips(differences: Sequence[Floats]) -> list[int]:
+    """Return those of many strips whose positions have notable means of (k, 3) differences."""
+    squares = np.array([own.mean(axis=0) ** 2 * len(own) for own in differences])
+    return notable(squares, MOST_STRIPS, 2) if np.isfinite(squares).all() else []
 
 
 def block_facts(block: Block, places: Floats) -> Facts:

@@ -17,7 +17,7 @@ use super::loss::Reweighting;
 use super::problem::AnyProblem;
 use super::terms::Terms;
 use super::walk::Buffers;
-use crate::normals::Layout;
+use crate::normals::{LANES, Layout};
 use crate::{Threads, parallel};
 
 /// An observation equation of unit weight.
@@ -223,11 +223,17 @@ impl<'a> Extended<'a> {
         });
     }
 
-    /// Calls `add` with the equations of retained blocks: ties, then unknowns as observations, each with its standard deviation.
-    pub fn each_retained(&self, mut add: impl FnMut(EquationOf, f64, &Row<'_>)) {
+    /// Calls `add` with each equation of retained blocks, as a block without unknowns of its own: ties, then unknowns as observations.
+    pub fn each_retained(&self, mut add: impl FnMut(&LocalRows)) {
         let problem = self.equations.problem();
         let (layout, mut buffers) = (problem.layout(), Buffers::default());
         let (groups, first) = (layout.groups() * layout.rows(), layout.all_locals().end);
+        let mut rows = LocalRows::default();
+        let mut add = |of, sd, row: &Row<'_>| {
+            rows.clear(0);
+            rows.push(self, (of, sd, row), first);
+            add(&rows);
+        };
         for tie in (0..layout.ties().len()).filter(|&tie| layout.ties()[tie].local.is_none()) {
             self.equations.each_row_of_tie(&mut buffers, tie, |row| {
                 let of = EquationOf::Tie { tie, row: row.number - groups - layout.tie_rows(tie).start };
@@ -237,11 +243,6 @@ impl<'a> Extended<'a> {
         self.equations.each_prior(&self.terms, first..layout.unknowns(), |unknown, row| {
             add(EquationOf::Unknown(unknown), problem.sd[unknown], row);
         });
-    }
-
-    /// Unknowns of an equation that are not fixed, with their coefficients.
-    pub fn free(&self, row: &Row<'_>) -> impl Iterator<Item = (usize, f64)> {
-        row.taken().filter(|own| !self.fixed[own.0])
     }
 
     /// The inverse of the normal matrix of a local block; zero if it has none.
@@ -319,8 +320,6 @@ struct Work {
 
 /// A number that is not given yet.
 const NONE: u32 = u32::MAX;
-/// Elements of the longest vector of a machine.
-const LANES: usize = 8;
 
 /// sum += factor times a vector of as many elements, a multiple of the lanes.
 #[inline(always)]
@@ -557,16 +556,13 @@ const SOLVED: usize = 32;
 /// Parts whose sums are separate, for any number of threads: the sums are the same, bit by bit.
 pub(super) const PARTS: usize = 64;
 
-/// The sums over ties of retained blocks and over unknowns that are not local: each equation is a block without unknowns of its own.
+/// The sums over ties of retained blocks and over unknowns that are not local.
 fn retained(extended: &Extended<'_>, count: usize) -> Sums {
     let layout = extended.equations.problem().layout();
     let (mut sums, mut work) = (Sums::new(layout, count), Work::default());
-    let mut rows = LocalRows::default();
-    extended.each_retained(|of, sd, row| {
-        rows.clear(0);
-        rows.push(extended, (of, sd, row), layout.unknowns());
+    extended.each_retained(|rows| {
         if rows.partials.iter().any(|own| own.1 != 0.0) {
-            sums.add(&rows, &[], &mut work);
+            sums.add(rows, &[], &mut work);
         }
     });
     sums

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::additional::{AT_LEAST, AdditionalParameters, Equation, EquationOf, LocalRows, PARTS, Shared};
+use super::additional::{AT_LEAST, AdditionalParameters, EquationOf, LocalRows, PARTS};
 use super::linearized::Linearized;
 use super::problem::AnyProblem;
 use super::walk::Buffers;
@@ -73,23 +73,26 @@ impl Linearized {
                 .for_each(|&(unknown, value)| left.axpy(-value, &effects.column(unknown - first), 1.0));
             left
         };
+        let add = |parts: &mut ScoreParts, rows: &LocalRows, inverse: &[f64]| {
+            let mut lefts: Vec<DVector<f64>> =
+                rows.rows().map(|(_, _, others, partials)| left(others, partials)).collect();
+            let width = rows.width();
+            let mut right = DMatrix::zeros(count, width);
+            for ((_, own, ..), left) in rows.rows().zip(&lefts) {
+                own.iter().enumerate().for_each(|(k, value)| right.column_mut(k).axpy(*value, left, 1.0));
+            }
+            let change = right * DMatrix::from_row_slice(width, width, inverse);
+            for (((constant, own, ..), left), &of) in rows.rows().zip(&mut lefts).zip(rows.of()) {
+                own.iter().enumerate().for_each(|(k, value)| left.axpy(-value, &change.column(k), 1.0));
+                parts.add(group_of(of), constant, left);
+            }
+        };
         let of_locals = |locals: Range<usize>| {
             let mut parts = ScoreParts::new(groups, count);
             let (mut rows, mut buffers) = (LocalRows::default(), Buffers::default());
             for local in locals {
                 extended.write(&mut buffers, local, &mut rows);
-                let mut lefts: Vec<DVector<f64>> =
-                    rows.rows().map(|(_, _, others, partials)| left(others, partials)).collect();
-                let width = rows.width();
-                let mut right = DMatrix::zeros(count, width);
-                for ((_, own, ..), left) in rows.rows().zip(&lefts) {
-                    own.iter().enumerate().for_each(|(k, value)| right.column_mut(k).axpy(*value, left, 1.0));
-                }
-                let change = right * DMatrix::from_row_slice(width, width, &extended.inverse(local, &rows));
-                for (((constant, own, ..), left), &of) in rows.rows().zip(&mut lefts).zip(rows.of()) {
-                    own.iter().enumerate().for_each(|(k, value)| left.axpy(-value, &change.column(k), 1.0));
-                    parts.add(group_of(of), constant, left);
-                }
+                add(&mut parts, &rows, &extended.inverse(local, &rows));
             }
             parts
         };
@@ -101,13 +104,7 @@ impl Linearized {
             sums.redundancy += part.redundancy;
             sums
         });
-        let (mut shared, mut partials) = (Shared::default(), vec![]);
-        extended.each_retained(|of, sd, row| {
-            partials.clear();
-            parameters.partials(&Equation { of, sd, row }, &mut shared, &mut partials);
-            let others: Vec<(usize, f64)> = extended.free(row).collect();
-            sums.add(group_of(of), row.constant, &left(&others, &partials));
-        });
+        extended.each_retained(|rows| add(&mut sums, rows, &[]));
         sums
     }
 }

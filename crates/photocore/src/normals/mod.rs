@@ -95,5 +95,5 @@ pub use panels::SelectedInverse;
 pub use solve::SolveOptions;
 pub use symbolic::{Operations, Symbolic};
 pub use system::{System, SystemError};
-pub(crate) use vectorised::dot;
+pub(crate) use vectorised::{LANES, dot};
 pub use watch::Between;

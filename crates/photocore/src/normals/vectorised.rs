@@ -77,7 +77,7 @@ impl<K: Kernel> WithSimd for Unsized<K> {
 /// Number of columns of a product with sums in registers.
 const TOGETHER: usize = 6;
 /// Number of rows of a product with sums in registers; matrices must be followed by as many readable elements.
-pub(super) const LANES: usize = 8;
+pub(crate) const LANES: usize = 8;
 
 /// Matrix stored row by row, in a buffer with at least [`LANES`] more elements.
 #[derive(Clone, Copy)]
