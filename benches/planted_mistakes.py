@@ -312,7 +312,8 @@ MISTAKES: dict[str, tuple[str, Condition, Mistake]] = {
         _gnss(lambda s, d: np.array([rotation(*pose[3:]).T @ [0.0, d, 0.0] for pose in s.poses])),
     ),
     "one distance": ("distance", lambda s: len(s.bars) > 0, _bar),
-    "all distances": ("distance-scale", lambda s: len(s.bars) > 1, _bars),
+    # Without other observations, the distances are the datum: the result names this assumption.
+    "all distances": ("distance-scale", lambda s: len(s.bars) > 1 and not s.is_free, _bars),
     "principal distance": ("camera-f", lambda s: not s.focal_sd, lambda s, d: replace(s, focal=s.focal + d)),
     "GNSS of one strip": (
         "gnss-set",

@@ -1412,8 +1412,7 @@ class NetworkTrial:
         limit: float,
         effects: int,
         observed: _Floats | None = None,
-        check_sd: _Floats | None = None,
-        check_weights: _Floats | None = None,
+        compared: int = 0,
         by_component: bool = False,
         photos: list[int] = ...,
     ) -> dict[str, Any]:
@@ -1445,9 +1444,8 @@ class NetworkTrial:
             Number of groups whose effects are computed: those of the largest bias-to-noise ratios.
         observed
             (P, 3) observed positions of photos; NaN if unknown. None: the adjusted ones.
-        check_sd, check_weights
-            (c, 3) standard deviations of the differences of the first c `checks`, and the inverse covariance
-            of all differences, row by row, zero for missing ones; None if only single points are tested.
+        compared
+            The number c of `checks` with known differences: the first ones.
         by_component
             Whether check points also test errors of each component of groups.
         photos
@@ -1458,8 +1456,8 @@ class NetworkTrial:
         Columns of the h hypotheses, those of s sets first: `code`, `group` (type as in `suspects`), `index`,
         `component` (-1 if a hypothesis has none), `observations`, `rank`, `statistic` T, `probability`,
         `redundancy` r, `noncentrality`, `bias_to_noise`; `estimate`, `plausible` (sizes) and `mdb`: (h, k)
-        with NaN for missing values. `effects` by row: points beyond the limit, points other than those of the
-        group that the largest undetected error moves so far, the largest change in standard deviations, its
+        with NaN for missing values. `effects` by row: points beyond the limit, the second largest change of
+        points other than those of the group, and the largest change of all, both in standard deviations, its
         point and coordinate, the largest change, and the changes of `checks`. `sets`: dictionaries with
         `parameters`, `plausible`, `estimate`, its `cofactors`, `error`, `sd_between_photos` (standard
         deviation of a significant readout time if it differs between photos; else None), and the changes of

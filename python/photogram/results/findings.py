@@ -14,8 +14,7 @@ from photogram.arguments.arrays import chosen, finite_rows
 from photogram.messages import Undetermined
 from photogram.results.duplicates import duplicates
 from photogram.results.fixed_tests import held_tested, how_to_calibrate
-from photogram.results.hypotheses import FEWEST as FEWEST_MOVED
-from photogram.results.hypotheses import SHARE as SHARE_MOVED
+from photogram.results.hypotheses import FEWEST
 from photogram.results.hypothesis_tests import largest_odds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
@@ -107,12 +106,11 @@ def _unchecked_control(result: AdjustedNetwork, types: Iterable[TypeFactor]) -> 
     sd = result.point_sd[result.used_points & ~weighted.any(axis=1)]
     checks = getattr(result, "check_points", None)
     shown = math.inf if checks is None or checks.agreement is None else np.nanmedian(checks.agreement.sd)
-    fewest = max(FEWEST_MOVED, math.ceil(SHARE_MOVED * np.count_nonzero(result.used_points)))
     return [
         phrase("unchecked.sd", kind=each.group, factor=each.undetected)
         for each in found
         if each.undetected * np.median(control) < CHANGED * shown
-        and np.count_nonzero((each.undetected * control > limit * sd).any(axis=1)) >= fewest
+        and np.count_nonzero((each.undetected * control > limit * sd).any(axis=1)) >= FEWEST
     ]
 
 

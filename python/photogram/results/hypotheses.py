@@ -21,8 +21,8 @@ from photogram.show.quantity import Axis, Quantity, Table, column, of_each, reco
 from photogram.statistics.findings import ALTERNATIVES, NEARLY, NEARLY_EXCHANGED
 from photogram.words import Phrase, phrase
 
-SHARE = 0.05  # Share of points that an undetected error may move beyond the limit
-FEWEST = 2  # Smallest number of other points that it moves
+FEWEST = 2  # Smallest number of points that an undetected error moves
+MARGIN = 0.75  # Standard deviations of an error beyond its estimate up to which the observations admit it
 RARE = 0.1  # Plausible errors of a set that may remain undetected
 OF_CAMERAS = frozenset(
     {
@@ -61,24 +61,15 @@ DATUM = frozenset(
         "scale",
     }
 )
-"""Errors that only change the datum: assumptions, unless independent observations test them.
+"""Errors that only change the datum: assumptions, unless independent observations or check points test them.
 
-Then sizes that these do not detect are graded, whatever their plausible size. Check points show the error of
-the datum; with them only errors of the scale are graded, because rigid motions do not deform the network."""
+Then sizes that these do not detect are graded, whatever their plausible size."""
 
 SCALES = frozenset({"control-scale", "distance-scale", "scale"})
 
-UNGRADED = frozenset(
-    {
-        *("attitude", "photo", "object-point", "camera", "unknown", "bending", "control-bending"),
-        *("camera-f-strip", "camera-f-half", "camera-size", "fixed-point", "readout-time-columns"),
-    }
-)
-"""Undetected errors that are no reason for a reservation: of single photos and targets, whose other
-observations have hypotheses of their own; of weighted parameters; bending and the image size,
-whose causes (terms of distortion, principal distance) are hypotheses of their own; principal distances of a
-strip or a flight; fixed points, of which only those with distances have hypotheses; and a readout by columns,
-which few cameras have."""
+UNGRADED = frozenset({"bending", "control-bending"})
+"""Undetected errors that are no reason for a reservation: terms of distortion, which bend a network, have
+hypotheses of their own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,16 +78,10 @@ class Effect:
 
     changes: Floats  # (d, 3) changes of the `drawn` points
     points: int  # beyond the limit
-    # Points without those that the error belongs to, beyond the limit although check points exist
-    others: int
+    others: float  # second largest change of points that the error does not belong to, standard deviations
     ratio: float  # largest change, standard deviations
     at: tuple[int, int] | None  # point and coordinate of this change
     change: float  # largest change in the linear unit
-
-    @property
-    def rank(self) -> float:
-        """Size of the effect for sorting: rounding does not define an order of equal effects."""
-        return round(math.log1p(self.ratio), 7)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +107,9 @@ class Hypotheses:
     sets: Sequence[Mapping[str, Any]]  # Other facts of the s sets; see `NetworkTrial.hypotheses`
     correlations: Floats  # (s, s) of the scores of sets: largest canonical ones; 1 if one includes the other
     effects: Mapping[int, Effect]  # of some rows
+    deviates: Mapping[int, float]  # Estimates of these errors in standard deviations, check points included
+    sizes: Mapping[int, float]  # Errors with these effects in standard deviations; 0 if nothing tests them
+    errors: Mapping[int, Floats]  # with these effects: the MDB, or the plausible size
     drawn: Indices  # (d,) points whose changes effects contain
     limit: float  # Standard deviations from which on an undetected error of a point counts
     suspects: NamedSuspects
@@ -130,7 +118,6 @@ class Hypotheses:
     times: str  # Unit of errors of times
     relative: Set[int]  # Rows of errors that only check points test
     single_odds: float  # Largest log odds of an error of a single observation, images among them
-    compared: bool  # Whether check points test the datum
     excess: float  # of the weighted sum of squares over its degrees of freedom; 0 if the weight is estimated
 
     def undetected(self, row: int) -> float:
@@ -140,16 +127,26 @@ class Hypotheses:
             return 1.0
         return math.erf(float(np.nanmax(np.abs(self.mdb[row, : len(plausible)]) / plausible)) / math.sqrt(2))
 
+    def admitted(self, row: int) -> float:
+        """Return the largest error that the observations admit, in units of the error with known effects.
+
+        This is the estimate and `MARGIN` standard deviations; the plausible size if nothing tests the error.
+        """
+        size = self.sizes[row]
+        return (self.deviates[row] + MARGIN) / size if size else 1.0
+
+    def moved(self, row: int) -> float:
+        """Return the largest change that this error causes, in standard deviations."""
+        return self.admitted(row) * self.effects[row].ratio
+
     def _is_harmful(self, row: int) -> bool:
-        """Whether an undetected error moves too many points."""
-        code, effect = self.code[row], self.effects[row]
-        if code in UNGRADED:
-            return False
-        if code in DATUM and (np.isnan(self.mdb[row, 0]) or (self.compared and code not in SCALES)):
+        """Whether the largest error that the observations admit moves two other points beyond the limit."""
+        code = self.code[row]
+        if code in UNGRADED or (code in DATUM and not self.sizes[row]):
             return False
         if code in SHARES and self.mdb[row, 0] < 1.0:
             return False
-        return effect.others >= max(FEWEST, math.ceil(SHARE * self.points))
+        return self.admitted(row) * self.effects[row].others > self.limit
 
     def name(self, row: int) -> Phrase:
         """Return the name of a hypothesis."""
@@ -192,9 +189,9 @@ class Hypotheses:
 
     @property
     def harmful(self) -> list[int]:
-        """Rows whose undetected errors move too many points, the worst first, without special cases."""
+        """Rows whose undetected errors move points too far, the worst first, without special cases."""
         rows = [row for row in self.effects if self._is_harmful(row)]
-        rows.sort(key=lambda row: (not np.isnan(self.mdb[row, 0]), -self.effects[row].rank))
+        rows.sort(key=lambda row: (self.sizes[row] > 0, -_rank(self.moved(row))))
         special = {other for row in rows for other in self._special_cases(row)}
         return [row for row in rows if row not in special]
 
@@ -221,7 +218,7 @@ class Hypotheses:
     @property
     def worst(self) -> int | None:
         """The first of these rows, else the row with the largest effect, errors of the datum last."""
-        rows = sorted(self.effects, key=lambda row: (self.code[row] in DATUM, -self.effects[row].rank))
+        rows = sorted(self.effects, key=lambda row: (self.code[row] in DATUM, -_rank(self.moved(row))))
         return next(iter([*self.harmful, *rows]), None)
 
     def unchecked(self) -> list[Phrase]:
@@ -229,23 +226,22 @@ class Hypotheses:
 
     def sentence(self, row: int) -> Phrase:
         """Return the message on an undetected error with a known effect, and on its special cases."""
-        if np.isnan(self.mdb[row, 0]):
+        if not self.sizes[row]:
             error = phrase("unchecked.any", named=self.name(row))
         else:
             size, named = self._main_component(row)
-            fields = {"size": size, "named": named, "percent": 100 * self.effects[row].points / self.points}
-            error = Phrase("unchecked.mdb", {**fields, "ratio": self.effects[row].ratio})
+            error = phrase("unchecked.size", size=size, named=named, ratio=self.moved(row))
         special = len(self._special_cases(row))
         return phrase("unchecked.nested", error=error, n=special) if special else error
 
     def _main_component(self, row: int) -> tuple[str, Phrase]:
-        """Return the size of an error, and its name if one component is nearly all of it."""
-        unit, mdb = self._unit(row), self.mdb[row][~np.isnan(self.mdb[row])]
-        squares = np.square(mdb)
+        """Return the size of the largest admitted error, and its name or that of its main component."""
+        unit, error = self._unit(row), self.admitted(row) * self.errors[row]
+        squares = np.square(error)
         parts = np.flatnonzero((self.group == self.group[row]) & (self.component >= 0))
-        if len(parts) == len(mdb) and squares.max() > MAIN * squares.sum():
+        if len(parts) == len(error) and squares.max() > MAIN * squares.sum():
             main = int(squares.argmax())
-            return f"{abs(mdb[main]):.3g}{unit}", self.name(int(parts[main]))
+            return f"{abs(error[main]):.3g}{unit}", self.name(int(parts[main]))
         return f"{math.sqrt(squares.sum()):.3g}{unit}", self.name(row)
 
     def assumed(self, least: int = 0) -> list[Phrase]:
@@ -259,7 +255,7 @@ class Hypotheses:
         }
         # If other observations test them weakly, the undetected errors are named.
         graded = {str(self.code[row]) for row in self.harmful}
-        sources = [("control-heights", "control-shift"), ("gnss-heights", "gnss-shift")]
+        sources = [("control-heights", "control-shift"), ("gnss-heights", "gnss-shift"), ("distance-scale",)]
         codes = [own[0] for own in sources if untested.intersection(own) and not graded.intersection(own)]
         return [self._assumption(code) for code in codes]
 
@@ -388,9 +384,9 @@ class Hypotheses:
     def common_is_harmful(self) -> bool:
         """Whether the most likely of these errors moves a point beyond the limit."""
         for row in self.common()[:1]:
-            estimate, error = self.sets[row]["estimate"], self.sets[row]["error"]
-            if row in self.effects and error is not None:
-                share = float(np.linalg.norm(estimate) / np.linalg.norm(error))
+            estimate = self.sets[row]["estimate"]
+            if row in self.effects:
+                share = float(np.linalg.norm(estimate) / np.linalg.norm(self.errors[row]))
                 return share * self.effects[row].ratio > self.limit
         return False
 
@@ -403,7 +399,7 @@ class Hypotheses:
     def effective(self) -> Indices:
         """Rows of the largest effects of undetected errors, for documents."""
         ranks = np.zeros(len(self.code))
-        ranks[[*self.effects]] = [effect.rank for effect in self.effects.values()]
+        ranks[[*self.effects]] = [_rank(effect.ratio) for effect in self.effects.values()]
         return np.argsort(-ranks, kind="stable")[:LISTED]
 
     def tests(self, rows: Indices | None = None) -> Table:
@@ -464,3 +460,8 @@ class Hypotheses:
             pairs = [pair for pair in zip(names, values, strict=False) if not math.isnan(pair[1])]
             texts.append(", ".join(f"{name} {value:.4g}".lstrip() for name, value in pairs))
         return column(name, np.array(texts, dtype=object), head, kind="name")
+
+
+def _rank(ratio: float) -> float:
+    """Return a size for sorting: rounding does not define an order of equal effects."""
+    return round(math.log1p(ratio), 7)

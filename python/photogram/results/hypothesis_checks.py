@@ -67,6 +67,35 @@ def with_checks(
     return False
 
 
+def in_deviations(
+    found: Facts, checks: int, joint: Joint | None, variance: float | None
+) -> tuple[dict[int, float], dict[int, float], dict[int, Floats]]:
+    """Return estimates of errors and the errors with known effects, both in standard deviations, and these.
+
+    An error e has the square e' R e and, if it changes check points by G e, e' G' C^-1 G e; 0 if nothing
+    tests it. Its estimate is the root of T, of several parameters of T - k + 1 (a limit of each direction).
+    `variance`: the estimated variance of unit weight; None if it is known.
+    """
+    deviates, sizes, errors = {}, {}, {}
+    for row, (*_, changes) in found["effects"].items():
+        mdb = found["mdb"][row]
+        tested = 0.0 if np.isnan(mdb[0]) else float(found["noncentrality"][row])
+        own = found["sets"][row] if row < len(found["sets"]) else found["groups"].get(row, {})
+        errors[row] = mdb[~np.isnan(mdb)] if tested else np.array(own.get("error", []))
+        squares, score = 0.0, 0.0
+        if joint is not None and len(errors[row]):
+            flat, differences, inverse = joint
+            g = changes[:checks].ravel()[flat]
+            if np.isfinite(g).all():
+                squares, score = float(g @ inverse @ g), float(g @ inverse @ differences)
+        statistic = np.nan_to_num(found["statistic"][row]) - max(found["rank"][row] - 1, 0)
+        if variance is not None:  # Their statistics do not include check points
+            statistic = statistic / variance if tested else np.divide(score**2, squares or 1.0)
+        deviates[row] = math.sqrt(max(statistic, 0.0))
+        sizes[row] = math.sqrt(tested + (variance or 1.0) * squares)
+    return deviates, sizes, errors
+
+
 def _inverse(matrix: Floats, units: Floats) -> Floats:
     """Return the pseudo-inverse of a symmetric matrix, computed with elements times `units`."""
     if matrix.size == 1:  # Most sets have one parameter

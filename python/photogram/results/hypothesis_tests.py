@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.results.hypotheses import DETECTION, SHARES, WHOLE, Effect, Hypotheses
-from photogram.results.hypothesis_checks import Joint, single_checks, with_checks
+from photogram.results.hypothesis_checks import Joint, in_deviations, single_checks, with_checks
 from photogram.results.network_trial import (
     IMAGE,
     NO_FACTS,
@@ -57,13 +57,10 @@ def hypotheses(
     core["checks"] = [*core["checks"], *drawn.tolist()]
     joint: Joint | None = None
     if agreement is not None:
-        core["check_sd"] = agreement.sd
+        core["compared"] = checks
         if agreement.joint is not None:
             flat, differences, covariance = agreement.joint
             joint = flat, differences, np.linalg.inv(covariance)  # Once for all hypotheses
-            weights = np.zeros((3 * checks, 3 * checks))
-            weights[np.ix_(flat, flat)] = joint[2]
-            core["check_weights"] = weights.ravel()
             # Otherwise, they differ no more than expected, and name no single component.
             core["by_component"] = (
                 agreement.together is not None and agreement.together.probability_above < 0.5
@@ -78,14 +75,16 @@ def hypotheses(
         found["index"][of_strips] = np.array(strips)[found["index"][of_strips]]
     effects, relative, alone = {}, set[int](), np.nan_to_num(found["statistic"])
     groups = _groups(suspects, found["group"], found["index"])
-    for row, (*sizes, changes) in found["effects"].items():
-        effects[row] = Effect(changes[checks:], *sizes)
+    for row, (*values, changes) in found["effects"].items():
+        effects[row] = Effect(changes[checks:], *values)
     if known and joint is not None:
         for row, own in [*enumerate(found["sets"]), *found["groups"].items()]:
             of_set = row < len(found["sets"])
-            sizes = own["plausible"] if of_set else trial.deviations[suspects.rows(int(groups[row]))]
-            if row in effects and with_checks(found, row, own, sizes, checks, joint):
+            units = own["plausible"] if of_set else trial.deviations[suspects.rows(int(groups[row]))]
+            if row in effects and with_checks(found, row, own, units, checks, joint):
                 relative.add(row)
+    variance = None if known else standing[0] / standing[1]
+    deviates, sizes, errors = in_deviations(found, checks, joint, variance)
     for own in found["sets"]:
         if own["sd_between_photos"] is not None:
             # Residuals are smaller than errors by the root of the mean redundancy number.
@@ -140,6 +139,9 @@ def hypotheses(
         log_odds=odds,
         by_checks=(np.nan_to_num(statistic) - alone) / 2,
         effects=effects,
+        deviates=deviates,
+        sizes=sizes,
+        errors=errors,
         drawn=drawn,
         limit=limit,
         suspects=suspects,
@@ -148,7 +150,6 @@ def hypotheses(
         times="s" if timed else "exposures",
         excess=max(standing[0] - standing[1], 0.0) if known else 0.0,
         relative=relative,
-        compared=agreement is not None,
         single_odds=float(np.nanmax(odds[sets:], initial=max(of_images, checked))),
     )
 

@@ -47,7 +47,7 @@ if TYPE_CHECKING:
 JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
 REMARKS = 5  # Number of messages of a `repr`
 LEVEL, POWER = 0.001, 0.80  # Significance level and power of minimal detectable errors
-MAX_BIAS_RATIO = 6.0  # Permitted effect of undetected errors on points, in standard deviations
+MAX_BIAS_RATIO = 5.0  # Permitted effect of undetected errors on points, in standard deviations
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)

@@ -94,7 +94,7 @@ class PicturedNetwork(plots.Pictured):
         if found is None or row is None or row not in found.effects:
             return None
         points, group = found.drawn, int(found.group[row])
-        changes = found.effects[row].changes * self.lengths(points)
+        changes = found.admitted(row) * found.effects[row].changes * self.lengths(points)
         sd = standard_deviations(self.covariances(points)) / self.unit_weight
         ratios = np.divide(np.abs(changes), sd, out=np.zeros_like(sd), where=sd > 0)
         own, photos = found.suspects.touched(group) if group >= 0 else ([], [])

@@ -206,7 +206,7 @@ impl NetworkTrial {
         Ok(all)
     }
 
-    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects, observed=None, check_sd=None, check_weights=None, by_component=false, photos=vec![]))]
+    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects, observed=None, compared=0, by_component=false, photos=vec![]))]
     #[allow(clippy::too_many_arguments, reason = "one for each fact")]
     fn hypotheses<'py>(
         &self,
@@ -224,14 +224,12 @@ impl NetworkTrial {
         limit: f64,
         effects: usize,
         observed: Option<Array<'_>>,
-        check_sd: Option<Array<'_>>,
-        check_weights: Option<PyReadonlyArray1<'_, f64>>,
+        compared: usize,
         by_component: bool,
         photos: Vec<usize>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let velocities = rows("velocities", &velocities)?;
         let observed = observed.map_or_else(|| Ok(vec![]), |own| rows("observed", &own))?;
-        let check_sd = check_sd.map_or_else(|| Ok(vec![]), |own| rows("check_sd", &own))?;
         let facts = Facts {
             velocities,
             times,
@@ -242,8 +240,7 @@ impl NetworkTrial {
             widths,
             photos,
             checks,
-            check_sd,
-            check_weights: check_weights.map_or(vec![], |own| own.as_array().iter().copied().collect()),
+            compared,
             by_component,
             centre,
             estimated,

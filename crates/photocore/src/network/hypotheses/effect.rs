@@ -1,12 +1,12 @@
 //! External reliability: what an undetected error changes of the points.
 
-use nalgebra::{DMatrix, DMatrixView, DVector, Vector3};
+use nalgebra::{DMatrix, DVector, Vector3};
 
 use super::super::suspects::Home;
 use super::super::trial::Trial;
 use super::facts::Facts;
 use crate::Threads;
-use crate::adjustment::{AdditionalParameters, Leverages, Linearized, detectable_noncentrality};
+use crate::adjustment::{AdditionalParameters, Leverages, Linearized};
 use crate::geometry::ObjectSpace;
 
 /// Local points whose changes are computed; of more points, those at equal intervals.
@@ -17,9 +17,8 @@ const SAMPLE: usize = 2000;
 pub struct Effect {
     /// Points that change by more standard deviations than the limit; of large networks estimated from 2,000 points.
     pub points: usize,
-    /// Points that the error does not belong to, and that the largest error changes beyond the limit which neither residuals nor check
-    /// points detect.
-    pub others: usize,
+    /// Change in standard deviations that two points at least exceed or reach which the error does not belong to.
+    pub others: f64,
     /// The largest change in standard deviations.
     pub ratio: f64,
     /// The point and the coordinate of this change; None if nothing changes.
@@ -44,8 +43,6 @@ pub(super) struct Sample<'a> {
     /// Where the check points are among these.
     checks: Vec<Option<usize>>,
     facts: &'a Facts,
-    /// lambda0 of a test of one parameter.
-    noncentrality: f64,
 }
 
 /// Changes of unknowns by errors, a column per error.
@@ -76,9 +73,7 @@ impl<'a> Sample<'a> {
         };
         let checks = places.into_iter().map(find).collect();
         let points = locals.iter().copied().chain(model.locals..points.len()).map(of).collect();
-        let (level, power) = facts.detection;
-        let noncentrality = detectable_noncentrality(level, power, 1.0, f64::INFINITY);
-        Self { trial, linearized, locals, counted: interval, share, points, checks, facts, noncentrality }
+        Self { trial, linearized, locals, counted: interval, share, points, checks, facts }
     }
 
     /// Changes by errors of parameters whose effects on unknowns that are not local are known.
@@ -109,7 +104,7 @@ impl<'a> Sample<'a> {
         threads: &Threads,
     ) -> DMatrix<f64> {
         // Behind the check points are points whose changes are only reported.
-        let checks = &self.checks[..self.facts.check_sd.len().min(self.checks.len())];
+        let checks = &self.checks[..self.facts.compared.min(self.checks.len())];
         let mut found = DMatrix::from_element(3 * checks.len(), count, f64::NAN);
         let (errors, first) = (DMatrix::identity(effects.ncols(), count), self.locals.len());
         let others = effects.columns(0, count).into_owned();
@@ -132,24 +127,6 @@ impl<'a> Sample<'a> {
         found
     }
 
-    /// Noncentrality of the tests of the check points if they change: of all together, or of the worst coordinate.
-    fn shown(&self, changes: &[[f64; 3]]) -> f64 {
-        let (sd, weights) = (&self.facts.check_sd, &self.facts.check_weights);
-        let ratios =
-            changes.iter().flatten().zip(sd.iter().flatten()).map(|(change, sd)| (change / sd).powi(2));
-        let single = ratios.filter(|own| own.is_finite()).fold(0.0, f64::max);
-        let count = 3 * sd.len();
-        if weights.is_empty() || weights.len() != count * count {
-            return single;
-        }
-        let weights = DMatrixView::from_slice(weights, count, count);
-        // Missing differences have no weights.
-        let known = |k: usize| if weights[(k, k)] == 0.0 { 0.0 } else { changes[k / 3][k % 3] };
-        let own = DVector::from_fn(count, |k, _| known(k));
-        let together = own.dot(&(weights * &own));
-        if together.is_finite() { single.max(together) } else { single }
-    }
-
     /// The effect of one of these errors; `own` are points that it belongs to.
     pub fn effect(&self, changes: &Changes, error: usize, own: &[usize]) -> Effect {
         let limit = self.facts.limit;
@@ -167,11 +144,8 @@ impl<'a> Sample<'a> {
             at.map_or([f64::NAN; 3], |index| std::array::from_fn(|axis| change(index, axis)))
         };
         let checks: Vec<[f64; 3]> = self.checks.iter().map(at_check).collect();
-        let shown = self.shown(&checks);
-        // Residuals and check points together detect an error that is smaller by this factor.
-        let smaller = (1.0 + shown / self.noncentrality).sqrt();
-        let mut effect = Effect { points: 0, others: 0, ratio: 0.0, at: None, change: 0.0, checks };
-        let (mut points, mut others) = (0.0, 0.0);
+        let mut effect = Effect { points: 0, others: 0.0, ratio: 0.0, at: None, change: 0.0, checks };
+        let (mut points, mut most) = (0.0, 0.0);
         let retained = self.locals.len()..self.points.len();
         for index in (0..self.counted).chain(retained) {
             let (point, sd) = self.points[index];
@@ -188,12 +162,15 @@ impl<'a> Sample<'a> {
                 }
             }
             if largest > limit {
-                let share = if index < self.counted { self.share } else { 1.0 };
-                points += share;
-                others += if largest <= limit * smaller || own.contains(&point) { 0.0 } else { share };
+                points += if index < self.counted { self.share } else { 1.0 };
+            }
+            if !own.contains(&point) {
+                // The second largest one.
+                effect.others = effect.others.max(largest.min(most));
+                most = most.max(largest);
             }
         }
-        (effect.points, effect.others) = (points.round() as usize, others.round() as usize);
+        effect.points = points.round() as usize;
         effect
     }
 }

@@ -23,10 +23,8 @@ pub struct Facts {
     pub photos: Vec<usize>,
     /// Check points, and other points whose changes are reported.
     pub checks: Vec<usize>,
-    /// Standard deviations of the differences of the check points, which are the first of these.
-    pub check_sd: Vec<[f64; 3]>,
-    /// Inverse covariance of all these differences, row by row, zero for missing ones; empty if only single points are tested.
-    pub check_weights: Vec<f64>,
+    /// Number of check points with known differences, which are the first of these.
+    pub compared: usize,
     /// Whether these also test errors of each component of groups.
     pub by_component: bool,
     /// Centre of scale, rotation and bending; the middle of the network if None.
