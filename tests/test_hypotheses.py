@@ -147,7 +147,7 @@ def test_every_hypothesis_agrees_with_a_dense_program(case):
             continue
         points, others, ratio, _, change, _ = row["effect"]
         assert points == expected["points_beyond_4"], name
-        assert others == expected["points_beyond_4_besides_own"], name
+        assert (others > GOLDEN["K"]) == (expected["points_beyond_4_besides_own"] >= 2), name
         assert ratio == pytest.approx(expected["largest_sd"], rel=1e-6), name
         assert change == pytest.approx(expected["largest_m"], rel=1e-6), name
     assert compared == 6 * 4 + 1 + len(GOLDEN["velocity"]) + len(SETS)
@@ -165,8 +165,8 @@ def test_scores_are_correlated_as_a_dense_program_has_it(case):
 @pytest.mark.parametrize(
     ("case", "verdict", "codes"),
     [
-        # A shift of control by 0.11 m would move all points, and positions do not detect it.
-        ("clean", "accepted-not-checked", []),
+        # The MDB of a shift of control, 0.11 m, would move all points, but its estimate is small.
+        ("clean", "accepted", []),
         ("control heights +0.3 m", "common-error", ["control-heights"]),
         ("lever arm (0.2, 0, 0) m", "common-error", ["time-offset", "lever-arm"]),
         ("f wrong by 0.3 %", "common-error", ["control-heights", "camera-f"]),
@@ -336,12 +336,12 @@ def test_the_limit_of_undetected_errors_decides_the_verdict():
 
 def test_special_cases_of_an_undetected_error_are_counted():
     """A shift of all control includes an error of all heights."""
-    result = adjust(block_of("clean")).with_max_bias_ratio(0.5)
+    result = adjust(block_of("clean")).with_max_bias_ratio(0.1)
     found = result._hypotheses()
     codes = [found.code[row] for row in found.harmful]
     assert "control-shift" in codes
     assert "control-heights" not in codes
-    assert "control-heights" in {found.code[row] for row in found.effects if found.effects[row].others > 40}
+    assert "control-heights" in {found.code[row] for row in found.effects if found.moved(row) > 0.1}
     nested = {
         each.fields["error"].fields["named"].code: each.fields["n"]
         for each in result.verdict.message.fields["errors"]
@@ -375,11 +375,12 @@ def test_the_plot_shows_what_an_undetected_error_changes():
     moved = result._plot_data().moved(row)
     point = found.suspects.points[found.group[row]]
     np.testing.assert_array_equal(moved.suspects, result.point_positions[[point]])
-    assert moved.ratios.max() == pytest.approx(found.effects[row].ratio, rel=1e-6)
-    assert np.count_nonzero(moved.ratios > moved.limit) == found.effects[row].points
+    assert moved.ratios.max() == pytest.approx(found.moved(row), rel=1e-6)
+    moves = moved.ratios > moved.limit * found.admitted(row)  # by the MDB
+    assert np.count_nonzero(moves) == found.effects[row].points
 
     positions = block.point_positions.copy()
-    positions[point] += found.mdb[row]
+    positions[point] += found.admitted(row) * found.mdb[row]
     wrong = adjust(block.replace(point_positions=positions))
     changes = wrong.point_positions[moved.points] - result.point_positions[moved.points]
     assert np.abs(changes - moved.changes).max() < 0.02 * np.abs(changes).max()
