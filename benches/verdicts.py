@@ -23,11 +23,13 @@ from typing import Any
 import numpy as np
 
 from photogram import PhotogramError, Result, adjust, snoop
+from photogram.results.hypotheses import MARGIN
 from planted_mistakes import ACCURACY, GIVEN, LARGEST, MISTAKES, TWICE, target
 from surveys import Survey, aerial, surveys
 
 WRONG = 5.0  # Standard deviations by which a mistake moves points of a wrong result
 SIZES = 0.5, 1.0, 3.0, 10.0  # of planted errors, in minimal detectable biases
+MARGINS = 0.25, 0.5, MARGIN, 1.0, 1.25, 1.5  # Standard deviations, see `least_margin`
 LENS = "camera-f", "camera-point", "camera-size", "camera-term", "camera-radial"
 
 
@@ -54,6 +56,17 @@ def size_of(result: Result, hypothesis: str, survey: Survey) -> float:
     if code == "object-point":
         own &= every.index == target(survey)
     return float(np.nanmax(np.abs(every.mdb[own][:1]), initial=0.0)) if own.any() else math.nan
+
+
+def least_margin(result: Result) -> float:
+    """Return the margin from which on an accepted result would be accepted with reserve only; else -infinity.
+
+    An error is reported if its estimate and so many standard deviations of it move two points too far.
+    """
+    summary = result.reliability_summary
+    if result.verdict.code not in ("accepted", "accepted-not-checked") or summary is None:
+        return -math.inf
+    return min(map(summary.hypotheses.margin, summary.hypotheses.effects), default=math.inf)
 
 
 def touched(survey: Survey, wrong: Survey) -> list[int]:
@@ -163,6 +176,7 @@ def main() -> None:
     counts: dict[tuple[str, str], dict[str, int]] = defaultdict(lambda: defaultdict(int))
     causes: dict[str, list[bool]] = defaultdict(list)
     bad, others = list[str](), list[str]()
+    margins: dict[str, list[float]] = {"clean": [], "wrong": []}
 
     def adjusted(survey: Survey) -> Result:
         datum: Mapping[str, Any] = {"datum": "inner"} if survey.is_free else {}
@@ -182,6 +196,8 @@ def main() -> None:
             continue
         control = "7 or more control" if len(survey.control) >= 7 else "fewer control"
         counts[f"clean, {survey.kind}", control][same.verdict.code] += 1
+        if len(survey.control) >= 7 and len(survey.checks) >= 3:
+            margins["clean"].append(least_margin(same))
         if options.clean:
             continue
         for name, (hypothesis, possible, mistake) in MISTAKES.items():
@@ -206,6 +222,8 @@ def main() -> None:
                 if name in ACCURACY:
                     off = 10 if sharpened(clean, result) > 1.5 or sharpened(result, clean) > 1.5 else 0
                     good = verdict.usable and verdict.code != "accepted-not-checked"
+                if off > WRONG and name not in ACCURACY:
+                    margins["wrong"].append(least_margin(result))
                 if off > WRONG and good:
                     bad.append(f"block {number} ({of}), {name} {size:g}: {off:.1f} sd, {verdict.code}")
                 if size >= 3 and hypothesis:
@@ -218,6 +236,11 @@ def main() -> None:
         print(f"{name:28s} {what:18s}", ", ".join(f"{code} {n}" for code, n in sorted(found.items())))
     for name, found in causes.items():
         print(f"{name:28s} the true cause is named in {sum(found)} of {len(found)} messages")
+    print("\nmargin, sd   clean, well controlled, reserved   wrong, accepted")
+    for margin in MARGINS:
+        clean, wrong = (np.array(margins[kind]) <= margin for kind in ("clean", "wrong"))
+        reserved, accepted = f"{clean.sum()} of {len(clean)}", f"{(~wrong).sum()} of {len(wrong)}"
+        print(f"{margin:10g}   {reserved:>32s}   {accepted:>15s}")
     print(f"\n{len(bad)} results accepted without reserve; two points are wrong by more than {WRONG:g} sd")
     print(*bad[:60], sep="\n")
     print(f"\n{len(others)} results with another cause")

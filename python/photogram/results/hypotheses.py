@@ -139,14 +139,22 @@ class Hypotheses:
         """Return the largest change that this error causes, in standard deviations."""
         return self.admitted(row) * self.effects[row].ratio
 
+    def margin(self, row: int) -> float:
+        """Return the margin from which on an error moves two other points beyond the limit.
+
+        These are standard deviations beyond its estimate. Infinite if it is no reason for a reservation;
+        negative infinity if nothing tests it.
+        """
+        code, others, size = self.code[row], self.effects[row].others, self.sizes[row]
+        if code in UNGRADED or (code in DATUM and not size) or (code in SHARES and self.mdb[row, 0] < 1.0):
+            return math.inf
+        if not size:
+            return -math.inf if others > self.limit else math.inf
+        return self.limit * size / others - self.deviates[row] if others else math.inf
+
     def _is_harmful(self, row: int) -> bool:
         """Whether the largest error that the observations admit moves two other points beyond the limit."""
-        code = self.code[row]
-        if code in UNGRADED or (code in DATUM and not self.sizes[row]):
-            return False
-        if code in SHARES and self.mdb[row, 0] < 1.0:
-            return False
-        return self.admitted(row) * self.effects[row].others > self.limit
+        return self.margin(row) < MARGIN
 
     def name(self, row: int) -> Phrase:
         """Return the name of a hypothesis."""
