@@ -25,7 +25,7 @@ from photogram.network.motion import on_shared, timed_images
 from photogram.network.rays import local_axes
 from photogram.network.trajectories import Readout
 from photogram.results.evaluation import evaluated
-from photogram.results.hypotheses import MARGIN, Hypotheses
+from photogram.results.hypotheses import Hypotheses
 from photogram.results.network_trial import block_facts
 from photogram.results.result import Result
 from photogram.statistics.reliability import TESTABLE, largest_effect, minimal_detectable_error
@@ -250,16 +250,13 @@ class Pattern:
 
     @cached_property
     def hypotheses(self) -> Hypotheses | None:
-        """Undetected errors and their effects without check points; None without redundancy.
-
-        Before the observation, the MDB is the largest error that may remain.
-        """
+        """Undetected errors and their effects without check points; None without redundancy."""
         if not self.result.degrees_of_freedom > 0:
             return None
         # In a plan, all points have given coordinates, but these check nothing.
         facts = block_facts(self.block, self.result.photo_positions)
         found = evaluated(self.result, self.result.reliability(), facts)[0]
-        return replace(found, deviates={row: size - MARGIN for row, size in found.sizes.items()})
+        return replace(found, planned=True)
 
     @property
     def known_rms_sd(self) -> tuple[float, float, float] | None:

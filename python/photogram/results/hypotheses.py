@@ -22,6 +22,7 @@ from photogram.statistics.findings import ALTERNATIVES, NEARLY, NEARLY_EXCHANGED
 from photogram.words import Phrase, phrase
 
 FEWEST = 2  # Smallest number of points that an undetected error moves
+SHARE = 0.05  # Share of points that a notable undetected error moves in a plan
 MARGIN = 0.75  # Standard deviations of an error beyond its estimate up to which the observations admit it
 RARE = 0.1  # Plausible errors of a set that may remain undetected
 OF_CAMERAS = frozenset(
@@ -71,6 +72,16 @@ UNGRADED = frozenset({"bending", "control-bending"})
 """Undetected errors that are no reason for a reservation: terms of distortion, which bend a network, have
 hypotheses of their own."""
 
+RARE_ERRORS = frozenset(
+    {
+        *("attitude", "photo", "object-point", "camera", "unknown", "fixed-point"),
+        *("camera-f-strip", "camera-f-half", "camera-size", "readout-time-columns"),
+    }
+)
+"""Errors that are no reason for a reservation if nothing tests them, or before the observation: of single
+photos and targets, of weighted parameters, principal distances of a strip or a flight, resized images, and a
+readout by columns."""
+
 
 @dataclass(frozen=True, eq=False)
 class Effect:
@@ -119,6 +130,7 @@ class Hypotheses:
     relative: Set[int]  # Rows of errors that only check points test
     single_odds: float  # Largest log odds of an error of a single observation, images among them
     excess: float  # of the weighted sum of squares over its degrees of freedom; 0 if the weight is estimated
+    planned: bool = False  # Whether the observations are planned
 
     def undetected(self, row: int) -> float:
         """Return the share of plausible errors that remain undetected; 1 without a plausible size."""
@@ -130,9 +142,10 @@ class Hypotheses:
     def admitted(self, row: int) -> float:
         """Return the largest error that the observations admit, in units of the error with known effects.
 
-        This is the estimate and `MARGIN` standard deviations; the plausible size if nothing tests the error.
+        This is the estimate and `MARGIN` standard deviations; the plausible size if nothing tests the error,
+        and the MDB before the observation.
         """
-        size = self.sizes[row]
+        size = 0.0 if self.planned else self.sizes[row]
         return (self.deviates[row] + MARGIN) / size if size else 1.0
 
     def moved(self, row: int) -> float:
@@ -148,8 +161,10 @@ class Hypotheses:
         code, others, size = self.code[row], self.effects[row].others, self.sizes[row]
         if code in UNGRADED or (code in DATUM and not size) or (code in SHARES and self.mdb[row, 0] < 1.0):
             return math.inf
-        if not size:
-            return -math.inf if others > self.limit else math.inf
+        if self.planned or not size:
+            is_notable = not self.planned or self.effects[row].points >= SHARE * self.points
+            is_reason = is_notable and others > self.limit and code not in RARE_ERRORS
+            return -math.inf if is_reason else math.inf
         return self.limit * size / others - self.deviates[row] if others else math.inf
 
     def _is_harmful(self, row: int) -> bool:
@@ -238,7 +253,9 @@ class Hypotheses:
             error = phrase("unchecked.any", named=self.name(row))
         else:
             size, named = self._main_component(row)
-            error = phrase("unchecked.size", size=size, named=named, ratio=self.moved(row))
+            code = "unchecked.planned" if self.planned else "unchecked.size"
+            percent = 100 * self.effects[row].points / self.points
+            error = phrase(code, size=size, named=named, percent=percent, ratio=self.moved(row))
         special = len(self._special_cases(row))
         return phrase("unchecked.nested", error=error, n=special) if special else error
 
