@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 from rich.markup import escape
@@ -19,8 +19,6 @@ from photogram.formats.read_options import ReadOptions
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Similarity
     from photogram.absolute_orientation.cards import Deck
-    from photogram.absolute_orientation.stream import Document
-    from photogram.io.writing import OutputSet
 
 
 ModelPointSd = Annotated[float, typer.Option(min=0.0)]
@@ -108,23 +106,13 @@ def absolute_orientation(
         if points and target:
             rows = None
             if documents.json:
-                rows = Document(
-                    documents.json, without_points(result), point_rows(*result.transform_points())
-                )
-                written.insert(0, documents.json)
+                stations = point_rows(*result.transform_points())
+                rows = Document(documents.json, without_points(result), stations)
             if decimals is None:
                 decimals = decimals_for((result.rms or 0.0) / result.similarity.scale)
-            _stream(
-                job,
-                outputs,
-                result.similarity,
-                points,
-                target,
-                document=rows,
-                point_sd=point_sd,
-                decimals=decimals,
-            )
-            written.insert(0, target)
+            sizes = {"point_sd": point_sd, "decimals": decimals}
+            _transform_file(job, result.similarity, points, target, document=rows, outputs=outputs, **sizes)
+            written = [target, *([documents.json] if documents.json else []), *written]
         for path, content in made.items():
             outputs.write(path, content)
     job.conclude(
@@ -150,7 +138,8 @@ def transform(
 
     similarity = read_similarity(result, usable=True) if _is_document(result) else read_transformation(result)
     with job.outputs() as outputs:
-        count = _stream(job, outputs, similarity, points, out, point_sd=point_sd, decimals=decimals)
+        sizes = {"point_sd": point_sd, "decimals": decimals}
+        count = _transform_file(job, similarity, points, out, outputs=outputs, **sizes)
     job.conclude([out], summary=lambda: output.print(f"{count} points"))
 
 
@@ -206,29 +195,11 @@ def _is_document(path: Path) -> bool:
     return any(line.lstrip().startswith("{") for line in read_lines(path)[:1])
 
 
-def _stream(
-    job: Job,
-    outputs: OutputSet,
-    similarity: Similarity,
-    points: Path,
-    target: Path,
-    *,
-    document: Document | None = None,
-    point_sd: float,
-    decimals: int,
-) -> int:
+def _transform_file(job: Job, similarity: Similarity, points: Path, target: Path, **options: Any) -> int:
     """Transform points, and show on standard error how many are done; return their number."""
     from photogram.absolute_orientation import transform_file
 
     text = f"transforming {escape(points.name)}"
     with job.status(text) as update:
-        return transform_file(
-            similarity,
-            points,
-            target,
-            decimals=decimals,
-            point_sd=point_sd,
-            document=document,
-            outputs=outputs,
-            progress=None if update is None else lambda done: update(f"{text}: {done} points"),
-        )
+        progress = None if update is None else lambda done: update(f"{text}: {done} points")
+        return transform_file(similarity, points, target, progress=progress, **options)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -16,9 +16,6 @@ from photogram.cli.job import Job, with_job
 from photogram.cli.options import Changes, Input, Threads, Without, misuse
 from photogram.lazy_dataclasses import replace
 from photogram.results.snooping_options import SnoopOptions, UnitWeight
-
-if TYPE_CHECKING:
-    from photogram.collection import AdjustedCollection
 
 PACKED = (".bz2", ".gz")
 
@@ -67,19 +64,16 @@ def collection(
         "ordering": choices.get("ordering", "auto"),
     }
 
-    def complete(result: AdjustedCollection) -> AdjustedCollection:
-        return result.with_max_bias_ratio(choices.get("max_bias_ratio"))
-
     result = outcome(
         job,
         photos,
         partial(adjust, photos, loss=robust, covariance=covariance, **options),
-        complete,
         # The value of --sd is not verified, so the default differs from blocks.
         snooping=replace(snooping, unit_weight=unit_weight) if snoop else None,
         bases=components or (),
         threads=threads,
         options=options,
+        max_bias_ratio=choices.get("max_bias_ratio"),
         name="cost",
         factor=0.5,
     )

@@ -63,12 +63,13 @@ def outcome(
     job: Job,
     network: object,
     adjust: Callable[..., Network],
-    complete: Callable[[Network], Network],
+    complete: Callable[[Network], Network] = lambda result: result,
     *,
     snooping: SnoopOptions | None,
     bases: Sequence[Basis],
     threads: int | None,
     options: Mapping[str, Any],
+    max_bias_ratio: float | None,
     **status: Any,
 ) -> AdjustmentOutcome[Network]:
     """Adjust a network, and remove gross errors and estimate variance components on request.
@@ -91,6 +92,7 @@ def outcome(
         else:
             log = snoop(network, snooping, **common, **options)
     result = complete(result if log is None else cast("Network", log.result))
+    result = result.with_max_bias_ratio(max_bias_ratio)
     if groups and cleaned is None:
         with estimation_status(job) as estimated:
             components = variance_components(network, groups, threads=threads, progress=estimated)

@@ -21,8 +21,7 @@ from photogram.results.snooping_options import SnoopOptions
 from photogram.words import phrase
 
 if TYPE_CHECKING:
-    from photogram import Block, Result
-    from photogram.giant import Project
+    from photogram import Result
 
 RESULTS = ("FRAMES", "GROUND", "RESTART", TEXT)
 
@@ -59,6 +58,9 @@ def giant(
     from photogram.giant import Limits, read_project
     from photogram.giant import listing as printout
     from photogram.giant.assembly import job_refraction
+    from photogram.giant.export import adjusted_records
+    from photogram.giant.files import to_bytes
+    from photogram.messages import Message
 
     check_maps(documents.map)
     _check_output(documents.folder, overwrite)
@@ -88,8 +90,7 @@ def giant(
 
     def complete(result: Result) -> Result:
         result = diagnosed(result)
-        result = replace(result, messages=[*messages, *result.messages])
-        return result.with_max_bias_ratio(choices.get("max_bias_ratio"))
+        return replace(result, messages=[*messages, *result.messages])
 
     try:
         with errors_explained(block):
@@ -102,13 +103,17 @@ def giant(
                 bases=components or (),
                 threads=threads,
                 options=options,
+                max_bias_ratio=choices.get("max_bias_ratio"),
             )
     except AdjustmentError:
         # Remarks on the input are often the reason.
         for message in messages[:SHOWN]:
             errors.print(escape(str(message)))
         raise
-    records = _records(project, block, found.result, as_published)
+    records = adjusted_records(project, block, found.result, as_published=as_published)
+    if "RESTART" not in records:
+        found.result.messages.append(Message.of("giant.no-restart"))
+    files = {name: to_bytes(lines) for name, lines in records.items()}
     pages = {}
     if listing is not None:
         printed = printout(project, block, found.result, as_published=as_published, limits=allowed)
@@ -116,7 +121,7 @@ def giant(
     documents.conclude(
         job,
         found.subject,
-        records | found.files,
+        files | found.files,
         document=found.document,
         network=found.result,
         beside=pages,
@@ -139,23 +144,3 @@ def _check_output(out: Path, overwrite: bool) -> None:
         others = [path for path in present[name] if path.name != name]
         if inputs and others:
             raise InputError(phrase("command.second-file", name=name), file=others[0])
-
-
-def _records(project: Project, block: Block, result: Result, as_published: bool) -> dict[str, bytes]:
-    """Return the files FRAMES, GROUND and RESTART of the output folder."""
-    from photogram.giant.export import adjusted_records
-    from photogram.giant.files import to_bytes
-    from photogram.messages import Message
-
-    records = adjusted_records(
-        project,
-        block,
-        photo_positions=result.photo_positions,
-        photo_attitudes=result.photo_attitudes,
-        point_positions=result.point_positions,
-        converged=result.converged,
-        as_published=as_published,
-    )
-    if "RESTART" not in records:
-        result.messages.append(Message.of("giant.no-restart"))
-    return {name: to_bytes(lines) for name, lines in records.items()}

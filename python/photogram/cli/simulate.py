@@ -13,7 +13,7 @@ from rich.markup import escape
 from photogram.cli.console import output
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Changes, Without, Writes, misuse
-from photogram.lazy_dataclasses import asdict, dataclass, replace
+from photogram.lazy_dataclasses import asdict, dataclass, fields, replace
 from photogram.network.refraction import Refraction
 from photogram.network.simulation_options import LineScanner, RollingShutter, SimulationOptions
 from photogram.words import phrase
@@ -69,28 +69,22 @@ class MotionOptions:
 
     def motion(self) -> RollingShutter | LineScanner | None:
         """Return the motion of these options, if any."""
-        given = {name: value for name, value in asdict(self).items() if value is not None}
-        given |= {"scenes": True} if given.pop("scenes") else {}
+        given = {name: each for name, each in asdict(self).items() if each is not None and each is not False}
         if not given:
             return None
         if ("readout" in given) == ("scanner" in given):
             raise misuse(_hint(given), "requires", options="either --readout or --scanner")
-        rolling = "readout" in given
-        strange = given.keys() & (_OF_SCANNERS if rolling else _OF_SHUTTERS)
-        if strange:
-            raise misuse(_hint(strange), "conflict", options="--readout" if rolling else "--scanner")
-        if rolling:
-            direction = given.pop("readout_direction", "down")
-            return RollingShutter(direction=direction, **given)
+        kind: Any = RollingShutter if "readout" in given else LineScanner
+        names = {"readout_direction": "direction", "scanner": "lines", "knots": "position"}
+        own = {each.name for each in fields(kind)}
+        if strange := [name for name in given if names.get(name, name) not in own]:
+            option = "--readout" if kind is RollingShutter else "--scanner"
+            raise misuse(_hint(strange), "conflict", options=option)
         if "knots" in given:
             from photogram.network.trajectories import Spline
 
-            given["position"] = given["rotation"] = Spline(every=given.pop("knots"))
-        return LineScanner(lines=given.pop("scanner"), **given)
-
-
-_OF_SHUTTERS = {"readout_sd", "readout_direction", "speed_sd", "rate", "rate_sd"}
-_OF_SCANNERS = {"view_angle", "pitch", "every", "knots", "scenes"}
+            given["knots"] = given["rotation"] = Spline(every=given["knots"])
+        return kind(**{names.get(name, name): value for name, value in given.items()})  # type: ignore[no-any-return]
 
 
 def _hint(names: Iterable[str]) -> str:

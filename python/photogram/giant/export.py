@@ -24,6 +24,7 @@ from photogram.network.refraction import Refraction, metres_per_unit
 from photogram.words import phrase
 
 if TYPE_CHECKING:
+    from photogram import Result
     from photogram.giant import Project
 
 Triple = tuple[float, float, float]
@@ -190,33 +191,24 @@ def adjusted_ground(
 
 
 def adjusted_records(
-    project: Project,
-    block: Block,
-    *,
-    photo_positions: Floats,
-    photo_attitudes: Floats,
-    point_positions: Floats,
-    converged: bool,
-    as_published: bool = False,
+    project: Project, block: Block, result: Result, *, as_published: bool = False
 ) -> dict[str, list[str]]:
     """Return the records of the output files by name (GIANT guide, section II.A).
 
     RESTART (unit 20) is omitted only if stations diverged beyond its columns. FRAMES (unit 8) and GROUND
-    (unit 9) are the result of a converged adjustment, unless COMMON forbids saving. Positions and attitudes
-    (P, 3), (P, 3), (n, 3) are from the last iteration, as in :func:`adjusted_frames` and
-    :func:`adjusted_ground`.
+    (unit 9) are the result of a converged adjustment, unless COMMON forbids saving.
     """
     geographic = project.common.geographic
-    frames = adjusted_frames(project, block, photo_positions, photo_attitudes)
+    frames = adjusted_frames(project, block, result.photo_positions, result.photo_attitudes)
     records = {}
     try:
         records["RESTART"] = written("RESTART", lambda: frame_records(frames, geographic))
     except InputError:
-        if converged:
+        if result.converged:
             raise
-    if converged and project.common.save_stations:
+    if result.converged and project.common.save_stations:
         records["FRAMES"] = records["RESTART"]
-    if converged and project.common.save_points:
-        ground = adjusted_ground(project, block, point_positions, as_published=as_published)
+    if result.converged and project.common.save_points:
+        ground = adjusted_ground(project, block, result.point_positions, as_published=as_published)
         records["GROUND"] = written("GROUND", lambda: ground_records(ground, geographic))
     return records
