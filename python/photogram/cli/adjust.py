@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from photogram.adjustment.options import Ordering
-from photogram.cli.choices import Choices, Unknowns, source
 from photogram.cli.console import print_remark, print_sections
 from photogram.cli.documents import Documents, check_maps
 from photogram.cli.in_parts import DIVIDING, adjusted_on_disk, print_plan
 from photogram.cli.job import Job, adjustment_status, with_job
 from photogram.cli.options import Input, OfSnooping, OutputFolder, Threads, Without, misuse
-from photogram.cli.projects import EXAMPLE, read_project
+from photogram.cli.projects import EXAMPLE, Choices, Unknowns, read_project, source
 from photogram.cli.statement_output import OfHead, stated, statement_files
 from photogram.distributed.division import Division
 from photogram.formats.read_options import ReadOptions

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
@@ -91,28 +91,25 @@ def failures() -> Iterator[None]:
     """Convert errors of input and adjustment to a message and an exit code."""
     from photogram.errors import AdjustmentError, ContradictionError, PhotogramError
 
+    code = INPUT_ERROR
     try:
         yield
+        return
     except MemoryError as error:
-        _fail(str(error) or str(phrase("command.memory")), INPUT_ERROR)
-    except AdjustmentError as error:
-        _fail(str(error), NOT_CONVERGED)
-    except ContradictionError as error:
-        _fail(str(error), NOT_USABLE)
+        text = str(error) or str(phrase("command.memory"))
     except PhotogramError as error:
-        _fail(str(error), INPUT_ERROR)
+        codes = {AdjustmentError: NOT_CONVERGED, ContradictionError: NOT_USABLE}
+        code = next((code for kind, code in codes.items() if isinstance(error, kind)), code)
+        text = str(error)
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package not in EXTRAS:
             raise
-        _fail(str(missing(package)), INPUT_ERROR)
+        text = str(missing(package))
     except OSError as error:
         # Readers and writers name their files. Other errors concern the standard streams.
         if error.filename is None:
             raise typer.Exit(stream_fault(error)) from None
-        _fail(f"{printable(str(error.filename))}: {error.strerror or error}", INPUT_ERROR)
-
-
-def _fail(text: str, code: int) -> NoReturn:
+        text = f"{printable(str(error.filename))}: {error.strerror or error}"
     errors.print(f"[bold red]error:[/] {escape(text)}")
     raise typer.Exit(code)

@@ -133,6 +133,11 @@ def misuse(option: str, code: str, /, **values: Any) -> typer.BadParameter:
     return typer.BadParameter(str(phrase(f"usage.{code}", **values)), param_hint=option)
 
 
+def words_of(text: str) -> tuple[str, ...]:
+    """Return the words of an option with commas between them."""
+    return tuple(word.strip() for word in text.split(",") if word.strip()) or (text,)
+
+
 def _enumerated(kind: Any) -> Any:
     """Return a type with enumerations of the words of lists, because typer reads no lists of literals."""
     if isinstance(kind, UnionType):

@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from photogram.cli.adjust import result_at
-from photogram.cli.choices import Choices, Unknowns
 from photogram.cli.console import print_document, print_remark
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Input, OutputFolder, Threads
+from photogram.cli.projects import Choices, Unknowns
 from photogram.cli.statement_output import StatementOptions, stated, statement_files
 from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import replace

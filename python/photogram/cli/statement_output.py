@@ -11,7 +11,7 @@ import typer
 
 from photogram.arguments.fields import option
 from photogram.cli.job import Job
-from photogram.cli.options import InputFile, Without, misuse
+from photogram.cli.options import InputFile, Without, misuse, words_of
 from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import asdict, dataclass
 from photogram.words import phrase
@@ -21,10 +21,6 @@ if TYPE_CHECKING:
     from photogram.formats import Project
     from photogram.results.statement.statement import Statement
     from photogram.words import Phrase
-
-
-def _standards(text: str) -> tuple[str, ...]:
-    return tuple(each.strip() for each in text.split(",") if each.strip())
 
 
 def _reasons(texts: Sequence[str]) -> dict[str, str]:
@@ -38,7 +34,7 @@ def _reasons(texts: Sequence[str]) -> dict[str, str]:
 class StatementOptions:
     """Options of an accuracy statement; a project can define them, too."""
 
-    standards: tuple[str, ...] | None = option(None, kind=str, parse=_standards, name="--standard")
+    standards: tuple[str, ...] | None = option(None, kind=str, parse=words_of, name="--standard")
     class_h: str | None = None
     class_v: str | None = None
     class_3d: str | None = None
