@@ -18,7 +18,6 @@ from photogram.formats.read_options import ReadOptions
 
 if TYPE_CHECKING:
     from photogram.absolute_orientation import Similarity
-    from photogram.absolute_orientation.cards import Deck
 
 
 ModelPointSd = Annotated[float, typer.Option(min=0.0)]
@@ -58,10 +57,16 @@ def absolute_orientation(
     if trace and method == "rigorous":
         raise misuse("--trace", "requires", options="--method report or fill-in")
     from photogram import orient
-    from photogram.absolute_orientation import read_similarity
-    from photogram.absolute_orientation.cards import read_restart, restart_record, transformation_records
+    from photogram.absolute_orientation import read_cards, read_csv, read_similarity
+    from photogram.absolute_orientation.cards import (
+        Deck,
+        read_restart,
+        restart_record,
+        transformation_records,
+    )
     from photogram.absolute_orientation.document import point_rows, without_points
     from photogram.absolute_orientation.orientation import trace_text
+    from photogram.absolute_orientation.stations import is_csv
     from photogram.absolute_orientation.stream import Document, decimals_for
     from photogram.messages import Message
 
@@ -72,7 +77,11 @@ def absolute_orientation(
     target = points_out or (documents.folder / f"{points.stem}-transformed.csv" if points else None)
     documents.declare(job, TEXT, pictures=["residuals"])
     job.writes(*([target] if target else []))
-    deck = _read(file, format, zero_missing, ground_unit, model_unit)
+    units = {"ground_unit": ground_unit, "model_unit": model_unit}
+    if format == "csv" or (format == "auto" and is_csv(file)):
+        deck = Deck(read_csv(file, **units), None, "")
+    else:
+        deck = read_cards(file, zero_missing=zero_missing, **units)
     former, ident = deck.former, deck.identification if ident is None else ident
     if restart:
         own = _is_document(restart)
@@ -177,16 +186,6 @@ def relative(
         summary=lambda: print_sections(strip.document(), "OUT"),
         code=NOT_USABLE if strip.unchecked else 0 if strip.converged else NOT_CONVERGED,
     )
-
-
-def _read(file: Path, format_: str, zero_missing: bool, ground_unit: str, model_unit: str) -> Deck:
-    from photogram.absolute_orientation import read_cards, read_csv
-    from photogram.absolute_orientation.cards import Deck
-    from photogram.absolute_orientation.stations import is_csv
-
-    if format_ == "csv" or (format_ == "auto" and is_csv(file)):
-        return Deck(read_csv(file, ground_unit=ground_unit, model_unit=model_unit), None, "")
-    return read_cards(file, zero_missing=zero_missing, ground_unit=ground_unit, model_unit=model_unit)
 
 
 def _is_document(path: Path) -> bool:

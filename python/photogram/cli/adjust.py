@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from photogram.adjustment.options import Ordering
-from photogram.cli.console import print_remark, print_sections
+from photogram.cli.console import print_remark, print_sections, print_text
 from photogram.cli.documents import Documents, check_maps
-from photogram.cli.in_parts import DIVIDING, adjusted_on_disk, print_plan
+from photogram.cli.in_parts import DIVIDING, adjusted_on_disk
 from photogram.cli.job import Job, adjustment_status, with_job
 from photogram.cli.options import Input, OfSnooping, OutputFolder, Threads, Without, misuse
 from photogram.cli.projects import EXAMPLE, Choices, Unknowns, read_project, source
@@ -86,7 +86,9 @@ def adjust(
     if plan:
         from photogram.distributed import plan_in_parts
 
-        print_plan(plan_in_parts(block, parts or division, project.options))
+        planned = plan_in_parts(block, parts or division, project.options)
+        print_text(planned.document())
+        planned.check()
         return
     job.remark(*(started.messages if started is not None else ()))
 

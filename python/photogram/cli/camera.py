@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -13,10 +13,6 @@ from photogram.cli.documents import PageAndJson
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Input, Reads, misuse
 from photogram.words import phrase
-
-if TYPE_CHECKING:
-    from photogram.film import Certificate
-    from photogram.film.years import DatedCamera
 
 
 @with_job("certificate", example=("certificate", "rc10.toml"))
@@ -54,39 +50,27 @@ def compare_certificates(
     The command compares images of directions instead of parameters, because parameters are correlated. Exit
     code 4: a camera has changed.
     """
-    from photogram.film.years import compare_cameras
-
-    if job.is_example:
-        from photogram.film.years.example import simulated_certificates
-
-        read: list[Certificate | DatedCamera] = [*simulated_certificates()]
-    else:
-        read = _read(calibrations or [], day or [], name)
-    found = compare_cameras(read, angle=None if angle is None else math.radians(angle))
-    documents.conclude(job, found, report=False, tables=("calibrations", "series"))
-
-
-def _read(paths: list[Path], days: list[str], name: str) -> list[Certificate | DatedCamera]:
-    """Read certificates, and cameras of other programs with their days."""
     from photogram.errors import InputError
     from photogram.film import Certificate
-    from photogram.film.years import DatedCamera
+    from photogram.film.years import DatedCamera, compare_cameras
+    from photogram.film.years.example import simulated_certificates
     from photogram.stellar.cameras import camera_from
 
-    found: list[Certificate | DatedCamera] = []
-    left = list(days)
-    for path in paths:
+    read: list[Certificate | DatedCamera] = [*simulated_certificates()] if job.is_example else []
+    days = list(day or [])
+    for path in calibrations or []:
         if path.suffix.lower() == ".toml":
-            found.append(Certificate.read(path))
+            read.append(Certificate.read(path))
             continue
-        if not left:
+        if not days:
             raise InputError(phrase("command.no-day"), file=path)
-        text = left.pop(0)
+        text = days.pop(0)
         try:
-            day = date.fromisoformat(text)
+            taken = date.fromisoformat(text)
         except ValueError:
             raise misuse("--day", "form", form="a date such as 1983-05-11", value=text) from None
-        found.append(DatedCamera(day, camera_from(path, name), source=path.stem))
-    if left:
-        raise misuse("--day", "day-without-file", day=left[0])
-    return found
+        read.append(DatedCamera(taken, camera_from(path, name), source=path.stem))
+    if days:
+        raise misuse("--day", "day-without-file", day=days[0])
+    found = compare_cameras(read, angle=None if angle is None else math.radians(angle))
+    documents.conclude(job, found, report=False, tables=("calibrations", "series"))

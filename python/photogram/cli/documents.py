@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -12,6 +11,7 @@ from rich.markup import escape
 from photogram.cli.console import SUMMARY, errors, print_document, print_remark, print_text
 from photogram.cli.job import Job
 from photogram.cli.options import OutputFile, OutputFolder, Without, misuse
+from photogram.extras import need
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import Phrase, phrase
 
@@ -80,7 +80,6 @@ class Documents:
         if self.plots:
             if self.out is None:
                 raise misuse("--plots", "requires", options="--out DIR")
-            from photogram.extras import need
             from photogram.plots.accessor import PLOTS
 
             if self.plot_format != "svg":
@@ -223,5 +222,4 @@ def check_maps(chart: Path | None) -> None:
 
     check_map(chart)
     for package in ("geopandas", "pyogrio"):
-        if find_spec(package) is None:
-            raise ModuleNotFoundError(f"No module named {package!r}", name=package)
+        need(package)

@@ -17,7 +17,6 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Result
-    from photogram.show.page import Document
 
 
 @with_job("film", example=("archive",), ending="-film")
@@ -70,33 +69,25 @@ def marks(
     `fiducials.csv` and `fiducial_images.csv` of a plain project. From a project it writes the same files of
     MicMac.
     """
-    from photogram.formats.micmac import has_marks, write_marks
+    from photogram.formats.micmac import has_marks, read_marks, write_marks
+    from photogram.io.csv_text import csv_text
+    from photogram.show.judgement import remarks_section
     from photogram.show.page import Document, Fact
 
     if has_marks(path):
-        files, document = _tables(job, path, name)
+        job.reads(*(each for each in sorted(path.rglob("*")) if each.suffix in (".xml", ".txt")))
+        found = read_marks(path)
+        remarks = [*map(str, found.remarks)]
+        files = {f"{table}.csv": csv_text(columns, remarks) for table, columns in found.tables(name).items()}
+        figures = [
+            Fact.of("Marks", len(found.places)),
+            Fact.of("Readings", sum(map(len, found.readings.values()))),
+            Fact.of("Photos", len(found.readings)),
+        ]
+        sections = [remarks_section(remarks)]
+        document = Document("Marks of MicMac", "", highlights=figures, sections=sections)
     else:
         files = write_marks(read_project(job, path, ReadOptions()))
         document = Document("For MicMac", "", highlights=[Fact.of("Files", len(files))])
     written = {} if out is None else {out / file: content for file, content in files.items()}
     job.finish(written, summary=lambda: print_document(document, "--out DIR", "remarks"))
-
-
-def _tables(job: Job, folder: Path, camera: str) -> tuple[dict[str, bytes], Document]:
-    """Return tables of the marks of MicMac from its files, and the document of their sizes."""
-    from photogram.formats.micmac import read_marks
-    from photogram.io.csv_text import csv_text
-    from photogram.show.judgement import remarks_section
-    from photogram.show.page import Document, Fact
-
-    job.reads(*(each for each in sorted(folder.rglob("*")) if each.suffix in (".xml", ".txt")))
-    found = read_marks(folder)
-    remarks = [*map(str, found.remarks)]
-    files = {f"{table}.csv": csv_text(columns, remarks) for table, columns in found.tables(camera).items()}
-    figures = [
-        Fact.of("Marks", len(found.places)),
-        Fact.of("Readings", sum(map(len, found.readings.values()))),
-        Fact.of("Photos", len(found.readings)),
-    ]
-    sections = [remarks_section(remarks)]
-    return files, Document("Marks of MicMac", "", highlights=figures, sections=sections)

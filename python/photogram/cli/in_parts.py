@@ -14,7 +14,6 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.distributed import Division
-    from photogram.distributed.plan import PartsPlan
 
 DIVIDING = ("--cluster", "--workers", "--parts", "--memory", "--run")
 """Options that divide an adjustment into parts."""
@@ -25,12 +24,6 @@ TAKEN = frozenset(
     )
 )
 """Options for a project on disk; any other option is rejected."""
-
-
-def print_plan(plan: PartsPlan) -> None:
-    """Print how a block would be adjusted in parts."""
-    print_text(plan.document())
-    plan.check()
 
 
 def adjusted_on_disk(
@@ -60,7 +53,9 @@ def adjusted_on_disk(
     opened = in_parts.on_disk(path, reading, folder, division, change=change, threads=threads)
     if is_plan:
         with opened as run:
-            print_plan(run.plan())
+            planned = run.plan()
+            print_text(planned.document())
+            planned.check()
         return True
     with adjustment_status(job) as progress, opened as run:
         outcome = run.adjust(progress)

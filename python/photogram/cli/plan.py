@@ -44,6 +44,7 @@ def plan(
     No measurements are necessary. The report contains expected standard deviations of points by number of
     rays and by location, of photographs, and the detectable gross errors.
     """
+    from photogram.network.simulation import simulate
     from photogram.planning.networks import plan as predict
 
     if packaged:
@@ -65,19 +66,12 @@ def plan(
             control_spacing=network.control_spacing if against_spacing is None else against_spacing,
             position_sd=network.position_sd if against_position_sd is None else against_position_sd,
         )
-        patterns = _simulated(*(space.of(each, bent, moves) for each in (network, second)))
+        options = [space.of(each, bent, moves) for each in (network, second)]
+        patterns = {_name(each): simulate(each, check_points=0).truth for each in options}
+        if len(patterns) < len(options):
+            raise misuse("--against", "same-pattern", pattern=next(iter(patterns)))
     made = predict(patterns)
     documents.conclude(job, made, plots=lambda: {"plan": made.plot()}, code=0)
-
-
-def _simulated(*networks: SimulationOptions) -> dict[str, Block]:
-    """Simulate networks with true positions and without observations."""
-    from photogram.network.simulation import simulate
-
-    patterns = {_name(network): simulate(network, check_points=0).truth for network in networks}
-    if len(patterns) < len(networks):
-        raise misuse("--against", "same-pattern", pattern=next(iter(patterns)))
-    return patterns
 
 
 def _name(network: SimulationOptions) -> str:

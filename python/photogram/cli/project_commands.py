@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from photogram.cli.console import print_sections
 from photogram.cli.job import Job, with_job
@@ -12,10 +12,6 @@ from photogram.cli.projects import EXAMPLE, read_project
 from photogram.formats.read_options import ReadOptions
 from photogram.messages import listed
 from photogram.words import phrase
-
-if TYPE_CHECKING:
-    from photogram.formats import Project
-    from photogram.show.page import Document
 
 CLASSES = {"h": "horizontal", "v": "vertical", "3d": "3D"}
 
@@ -33,43 +29,37 @@ def info(
     If the project requests an accuracy statement, the command describes the subject of the statement.
     """
     from photogram.formats.description import described
+    from photogram.results.statement.request import Asked
+    from photogram.results.statement.texts import Texts
     from photogram.show.forms import to_json
+    from photogram.show.page import Fact, Facts, Section
 
     project = read_project(job, path, reading)
     document = described(project)
     if project.statement:
-        document = _with_statement(document, project)
+        asked, texts = Asked.checked(**project.statement), Texts(unit=project.block.linear_unit)
+        classes = [f"{CLASSES[name]} {texts.size(size)}" for name, size in asked.classes.items()]
+        budgets = "three that are chosen" if asked.budgets is None else listed(list(asked.budgets)) or "none"
+        facts = [
+            Fact("Standards", ", ".join(asked.standards)),
+            Fact("Classes", ", ".join(classes) or "none"),
+            Fact.of("Check points", len(project.checks)),
+            *([Fact.of("Calibrated lengths", len(asked.lengths))] if asked.lengths else []),
+            Fact("Budgets", budgets),
+        ]
+        members = {
+            "standards": list(asked.standards),
+            "classes": dict(asked.classes),
+            "check_points": len(project.checks),
+            "calibrated_lengths": len(asked.lengths),
+            "budgets": asked.budgets,
+        }
+        document = document.with_sections(Section("statement", "Accuracy statement", [Facts("", facts)]))
+        document = document.with_members(lambda: {"statement": members})
     job.finish(
         {} if json is None else {json: to_json(document)},
         summary=lambda: print_sections(document, "--json FILE"),
     )
-
-
-def _with_statement(document: Document, project: Project) -> Document:
-    """Return the document of a project with the subject of its accuracy statement."""
-    from photogram.results.statement.request import Asked
-    from photogram.results.statement.texts import Texts
-    from photogram.show.page import Fact, Facts, Section
-
-    asked, texts = Asked.checked(**project.statement), Texts(unit=project.block.linear_unit)
-    classes = [f"{CLASSES[name]} {texts.size(size)}" for name, size in asked.classes.items()]
-    budgets = "three that are chosen" if asked.budgets is None else listed(list(asked.budgets)) or "none"
-    facts = [
-        Fact("Standards", ", ".join(asked.standards)),
-        Fact("Classes", ", ".join(classes) or "none"),
-        Fact.of("Check points", len(project.checks)),
-        *([Fact.of("Calibrated lengths", len(asked.lengths))] if asked.lengths else []),
-        Fact("Budgets", budgets),
-    ]
-    members = {
-        "standards": list(asked.standards),
-        "classes": dict(asked.classes),
-        "check_points": len(project.checks),
-        "calibrated_lengths": len(asked.lengths),
-        "budgets": asked.budgets,
-    }
-    document = document.with_sections(Section("statement", "Accuracy statement", [Facts("", facts)]))
-    return document.with_members(lambda: {"statement": members})
 
 
 @with_job("convert", example=EXAMPLE)

@@ -16,9 +16,6 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.io.writing import Content
-    from photogram.stellar.night_result import CalibratedNight
-    from photogram.stellar.problem import Problem
-    from photogram.stellar.result import Result
 
 
 Lens = Literal["auto", "brown", "equidistant", "equisolid", "stereographic", "kannala_brandt"]
@@ -44,9 +41,14 @@ def stellar_camera(
     from photogram.statistics.verdict import worst
     from photogram.stellar import calibrate
     from photogram.stellar.cameras import camera_document
+    from photogram.stellar.deck import read_deck
+    from photogram.stellar.plain import read_plain
+    from photogram.stellar.printout import plate_list, printout
+    from photogram.stellar.tomlfile import inputs
 
-    problems, inputs = _read(deck)
-    job.reads(*inputs)
+    is_toml = deck.suffix.lower() == ".toml"
+    problems = [read_plain(deck)] if is_toml else read_deck(deck)
+    job.reads(*(inputs(deck) if is_toml else [deck]))
     documents = replace(documents, out=documents.out or Path(f"{deck.stem}-calibrated"))
     documents.declare(job)
     files: dict[Path, Content] = {}
@@ -60,7 +62,11 @@ def stellar_camera(
         results.append((result, document))
         mark = f"-{number}" if len(problems) > 1 else ""
         cameras = {f"camera{mark}.json": camera_document(result)}
-        files |= documents.inside(_files(result, mark))
+        files |= documents.inside({f"listing{mark}.txt": result.report().encode()})
+        if problem.options.as_published:
+            files |= documents.inside({f"printout{mark}.txt": printout(result).encode()})
+        if problem.options.plate_list:
+            files |= documents.inside({f"plate{mark}.txt": plate_list(result)})
         withheld = phrase("command.camera-withheld", names=list(cameras))
         files |= documents.unless_withheld(cameras, withheld, usable=result.verdict.usable)
         files |= documents.pictures(document.plots, mark)
@@ -93,6 +99,7 @@ def exposures(
     from photogram.io.places import Place, at_place
     from photogram.stellar.night_calibration import calibrate_night
     from photogram.stellar.night_file import read_night
+    from photogram.stellar.sky_cameras import WITH_YAML, to_yaml
     from photogram.stellar.tomlfile import inputs
 
     job.reads(*inputs(night))
@@ -114,7 +121,10 @@ def exposures(
         f"{name}.csv": document.table(key).frame().to_csv(index=False).encode()
         for name, key in (("exposures", "exposures"), ("star-images", "images"))
     }
-    cameras = _night_cameras(result)
+    cameras = {"camera.json": result.camera.to_json()}
+    if result.camera.lens in WITH_YAML:
+        cameras["camera.yaml"] = to_yaml(result.camera, result.night.frame, "opencv")
+        cameras["camera-ros.yaml"] = to_yaml(result.camera, result.night.frame, "ros")
     withheld = phrase("command.camera-withheld", names=list(cameras))
     documents.conclude(
         job,
@@ -157,35 +167,3 @@ def places(
         "magnitude": stars.magnitudes,
     }
     job.finish({out: csv_text(columns)}, summary=lambda: output.print(f"{len(stars.ids)} stars at {utc}"))
-
-
-def _read(deck: Path) -> tuple[list[Problem], list[Path]]:
-    """Return the problems, and the files that they are read from."""
-    from photogram.stellar.deck import read_deck
-    from photogram.stellar.plain import read_plain
-    from photogram.stellar.tomlfile import inputs
-
-    return ([read_plain(deck)], inputs(deck)) if deck.suffix.lower() == ".toml" else (read_deck(deck), [deck])
-
-
-def _files(result: Result, mark: str) -> dict[str, bytes]:
-    """Return the listing of one problem, and the prints of the report on request."""
-    from photogram.stellar.printout import plate_list, printout
-
-    made = {f"listing{mark}.txt": result.report().encode()}
-    if result.problem.options.as_published:
-        made[f"printout{mark}.txt"] = printout(result).encode()
-    if result.problem.options.plate_list:
-        made[f"plate{mark}.txt"] = plate_list(result)
-    return made
-
-
-def _night_cameras(result: CalibratedNight) -> dict[str, bytes]:
-    """Return the camera files of a night."""
-    from photogram.stellar.sky_cameras import WITH_YAML, to_yaml
-
-    cameras = {"camera.json": result.camera.to_json()}
-    if result.camera.lens in WITH_YAML:
-        cameras["camera.yaml"] = to_yaml(result.camera, result.night.frame, "opencv")
-        cameras["camera-ros.yaml"] = to_yaml(result.camera, result.night.frame, "ros")
-    return cameras
