@@ -20,8 +20,10 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from photogram.arguments.objects import argument_error as argument_error
+from photogram.arguments.objects import value_field as value_field
 from photogram.errors import InputError
-from photogram.words import Phrase, phrase
+from photogram.words import phrase
 
 LARGEST_SD = math.sqrt(sys.float_info.max)  # Larger standard deviations have an infinite variance
 _SYMMETRIC = 1e-9  # Largest asymmetry of a covariance matrix, relative to its diagonal
@@ -99,26 +101,16 @@ def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np
     return found
 
 
-def whole_numbers(name: str, value: ArrayLike, of: str = "whole numbers") -> NDArray[np.int64]:
-    """Return an array of integers of any shape, possibly the caller's array."""
-    array = _of_kind(name, value, "iu", of)
-    if array.dtype.kind == "u" and array.size and array.max() >= 2**63:
-        raise _no_array(name, "whole numbers of 64 bits", value)
-    return array.astype(np.int64, copy=False)
-
-
-def truth_values(name: str, value: ArrayLike) -> NDArray[np.bool_]:
-    """Return an array of truth values of any shape, possibly the caller's array."""
-    return _of_kind(name, value, "b", "truth values").astype(np.bool_, copy=False)
-
-
-def _of_kind(name: str, value: ArrayLike, kinds: str, of: str) -> NDArray[Any]:
+def of_kind(name: str, value: ArrayLike, kinds: str, of: str) -> NDArray[Any]:
+    """Return an array of integers (`iu`) or truth values (`b`), possibly the caller's array."""
     array = _array(name, value, of)
     if array.size and array.dtype.kind not in kinds:
         raise _no_array(name, of, value)
     if _mask(value) is not None:
         raise argument_error(name, "masked")
-    return array
+    if array.size and array.dtype.kind == "u" and array.max() >= 2**63:
+        raise _no_array(name, "whole numbers of 64 bits", value)
+    return array.astype(np.bool_ if kinds == "b" else np.int64, copy=False)
 
 
 def _array(name: str, value: ArrayLike, of: str) -> NDArray[Any]:
@@ -202,7 +194,7 @@ def length(name: str, value: ArrayLike) -> int:
 
 def indices(name: str, value: ArrayLike, length: int, count: int) -> NDArray[np.int64]:
     """Return a read-only array of `length` integers from 0 to `count` - 1."""
-    array = whole_numbers(name, value, f"{length} whole numbers")
+    array = of_kind(name, value, "iu", f"{length} whole numbers")
     if array.shape != (length,):
         raise argument_error(name, "shape", shape=(length,), actual=array.shape)
     bad = np.flatnonzero((array < 0) | (array >= count))
@@ -280,26 +272,6 @@ def one_of(name: str, value: object, choices: Sequence[str]) -> str:
     if not (isinstance(value, str) and value in choices):
         raise argument_error(name, "choice", names=list(choices), value=value)
     return value
-
-
-def value_field(value: object) -> str | float | Phrase:
-    """Return a value as a field of a message: text, number, or short description."""
-    if isinstance(value, int) and value.bit_length() > 128:
-        return phrase("error.long-integer", bits=value.bit_length())
-    if isinstance(value, str) or (isinstance(value, int | float) and not isinstance(value, bool)):
-        return value
-    try:
-        return phrase("error.value", value=" ".join(ascii(value).split())[:80])
-    except Exception:  # A foreign object may raise any error, a deeply nested one a RecursionError
-        return phrase("error.object", type=type(value).__name__)
-
-
-def argument_error(name: str, code: str, /, **fields: object) -> InputError:
-    """Return the error of an argument; `code` is a message code without `error.`."""
-    texts = {key: str(value) if isinstance(value, tuple) else value for key, value in fields.items()}
-    if "value" in fields and not isinstance(fields["value"], Phrase):
-        texts["value"] = value_field(fields["value"])
-    return InputError(phrase("error.at", what=name, message=phrase(f"error.{code}", **texts)))
 
 
 def object_name(name: str, value: object) -> str:

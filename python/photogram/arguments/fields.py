@@ -156,8 +156,8 @@ def _check_of(of: str, names: Mapping[str, Any], *, optional: bool) -> Check | N
         "str": _text,
         "Path": path_of,
         "Floats": arrays.numbers,
-        "Indices": arrays.whole_numbers,
-        "Bools": arrays.truth_values,
+        "Indices": partial(arrays.of_kind, kinds="iu", of="whole numbers"),
+        "Bools": partial(arrays.of_kind, kinds="b", of="truth values"),
     }
     kind: Any = eval(of, {"Literal": Literal}) if of.startswith("Literal[") else _named(of, names)
     if get_origin(kind) is Literal:

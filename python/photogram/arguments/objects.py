@@ -1,4 +1,4 @@
-"""Validation of arguments that are objects, or lists of objects, of a class."""
+"""Errors of arguments, and validation of arguments that are objects of a class; without arrays."""
 
 from __future__ import annotations
 
@@ -6,10 +6,29 @@ import os
 from collections.abc import Collection
 from pathlib import Path
 
-from photogram.arguments.arrays import argument_error
 from photogram.errors import InputError
 from photogram.messages import unknown_name
-from photogram.words import Phrase
+from photogram.words import Phrase, phrase
+
+
+def value_field(value: object) -> str | float | Phrase:
+    """Return a value as a field of a message: text, number, or short description."""
+    if isinstance(value, int) and value.bit_length() > 128:
+        return phrase("error.long-integer", bits=value.bit_length())
+    if isinstance(value, str) or (isinstance(value, int | float) and not isinstance(value, bool)):
+        return value
+    try:
+        return phrase("error.value", value=" ".join(ascii(value).split())[:80])
+    except Exception:  # A foreign object may raise any error, a deeply nested one a RecursionError
+        return phrase("error.object", type=type(value).__name__)
+
+
+def argument_error(name: str, code: str, /, **fields: object) -> InputError:
+    """Return the error of an argument; `code` is a message code without `error.`."""
+    texts = {key: str(value) if isinstance(value, tuple) else value for key, value in fields.items()}
+    if "value" in fields and not isinstance(fields["value"], Phrase):
+        texts["value"] = value_field(fields["value"])
+    return InputError(phrase("error.at", what=name, message=phrase(f"error.{code}", **texts)))
 
 
 def kind_error(name: str, kind: str, value: object) -> InputError:

@@ -51,15 +51,14 @@ def read_columns(
     known: Collection[str] = (),
     numbers: Collection[str] = (),
     spelling: Spelling = tuple,
-    hint: Callable[[Sequence[str]], str | Phrase] | None = None,
 ) -> ColumnTable:
     """Read a table from a text or Parquet file.
 
     A header contains at least one of the `known` columns: it may then begin with the mark of a comment. The
     reader of large tables requires the columns of `numbers`. `spelling` returns the names of all columns from
-    those in the file (in small letters). `hint` returns the error of a first record without a known column.
+    those in the file (in small letters).
     """
-    return next(read_batches(path, known=known, numbers=numbers, spelling=spelling, hint=hint, size=None))
+    return next(read_batches(path, known=known, numbers=numbers, spelling=spelling, size=None))
 
 
 def read_batches(
@@ -73,7 +72,8 @@ def read_batches(
 ) -> Iterator[ColumnTable]:
     """Yield a table in batches of about `size` bytes; arguments as in :func:`read_columns`.
 
-    There is at least one batch. A table with decimal commas or irregular lines is one batch.
+    There is at least one batch. A table with decimal commas or irregular lines is one batch. `hint` returns
+    the error of a first record without a known column.
     """
     if path.suffix == ".parquet":
         return _parquet(path, spelling, numbers, size)

@@ -38,14 +38,13 @@ class Column:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """A table that was read: arrays of numbers, lists of names, and metadata.
+    """A table that was read: arrays of numbers, and columns of names.
 
     A missing column, or one of another type, is an :class:`InputError`.
     """
 
     path: Path  # The file
     columns: Mapping[str, Any]  # By name
-    about: Mapping[str, str]  # Metadata of the table
 
     @property
     def rows(self) -> int:
@@ -113,9 +112,7 @@ def read_sheet(path: Path) -> Sheet:
         table = pyarrow.parquet.read_table(path, page_checksum_verification=True)
     except (OSError, pyarrow.ArrowException) as error:
         raise InputError(phrase("error.parse", format="Parquet", reason=str(error)), file=path) from None
-    columns = {name: _values(path, name, table.column(name)) for name in table.column_names}
-    about = {key.decode(): value.decode() for key, value in (table.schema.metadata or {}).items()}
-    return Sheet(path, columns, about)
+    return Sheet(path, {name: _values(path, name, table.column(name)) for name in table.column_names})
 
 
 def coded(column: pyarrow.ChunkedArray) -> tuple[list[str], Indices]:
