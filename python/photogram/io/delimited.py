@@ -79,9 +79,9 @@ def read_batches(
         return _parquet(path, spelling, numbers, size)
 
     def header(text: str) -> _Header:
-        head, delimiter = _head(path, text, known, spelling, hint)
-        own = tuple(cell.strip().lower() for cell in _split(head, delimiter))
-        return head, own, _named(head, own, spelling, settled=hint is not None), delimiter
+        head = _head(path, text, known, spelling, hint)
+        own = _names(head)
+        return head, own, _named(head, own, spelling, settled=hint is not None), _delimiter(head)
 
     return _read(path, header, numbers, size)
 
@@ -92,8 +92,7 @@ def read_head(path: Path, known: Collection[str] = (), spelling: Spelling = tupl
         import pyarrow.parquet
 
         return [name.strip().lower() for name in pyarrow.parquet.read_schema(path).names]
-    head, delimiter = _head(path, read_beginning(path), known, spelling, None)
-    return [cell.strip().lower() for cell in _split(head, delimiter)]
+    return [*_names(_head(path, read_beginning(path), known, spelling, None))]
 
 
 def _named(head: Place, own: Sequence[str], spelling: Spelling, *, settled: bool = False) -> tuple[str, ...]:
@@ -121,7 +120,7 @@ def read_rows(path: Path, columns: Sequence[str], *, numbers: Collection[str] = 
         ]
         places = [Place(path, row + 1, lines[row]) for row in filled[:TITLES] or [0]]
         for place in places:
-            cells = _split(place, _delimiter(place))
+            cells = _split(place)
             if len(cells) == len(columns) and _fits(cells, columns, numbers):
                 break
         else:
@@ -139,8 +138,8 @@ def read_records(path: Path, *, spelling: Spelling = tuple, ragged: bool = False
     `spelling` returns the names of all columns from those in the file.
     """
     lines = [line if line.strip(" \t,;|") else "" for line in read_lines(path)]
-    head, delimiter = _head(path, "\n".join(lines), (), spelling, None)
-    columns = _named(head, _split(head, delimiter), spelling)
+    head = _head(path, "\n".join(lines), (), spelling, None)
+    columns, delimiter = _named(head, _split(head), spelling), _delimiter(head)
     assert head.record is not None
     rows, records = _by_lines(path, lines, head.record, columns, delimiter, (), ragged=ragged)
     cells = {name: [row[k] for row in rows] for k, name in enumerate(columns)}
@@ -215,7 +214,7 @@ def _head(
     known: Collection[str],
     spelling: Spelling,
     hint: Callable[[Sequence[str]], str | Phrase] | None,
-) -> tuple[Place, str]:
+) -> Place:
     """Find the header: the first line, or the last comment before it.
 
     If title lines precede it, it is the first line below them with several known columns.
@@ -230,24 +229,24 @@ def _head(
             continue
         head = Place(path, record, line)
         for place in (head, comment):
-            if place is not None and not set(known).isdisjoint(_spelled(place, spelling)):
-                return place, _delimiter(place)
+            if place is not None and not set(known).isdisjoint(spelling(_names(place))):
+                return place
         if known and comment is None:
             for number, row in enumerate(itertools.islice(_LINE.finditer(text), record, TITLES), record + 1):
                 below = Place(path, number, row[1])
-                if len(set(known).intersection(_spelled(below, spelling))) > 2:
-                    return below, _delimiter(below)
+                if len(set(known).intersection(spelling(_names(below)))) > 2:
+                    return below
             if hint is not None:
-                raise head.error(hint([cell.strip() for cell in _split(head, _delimiter(head))]))
+                raise head.error(hint([cell.strip() for cell in _split(head)]))
             raise head.error(phrase("cells.header", names=sorted(known)))
-        return head, _delimiter(head)
-    if comment is not None and not set(known).isdisjoint(_spelled(comment, spelling)):
-        return comment, _delimiter(comment)
+        return head
+    if comment is not None and not set(known).isdisjoint(spelling(_names(comment))):
+        return comment
     raise Place(path).error(phrase("error.empty-file", content="a table"))
 
 
-def _spelled(place: Place, spelling: Spelling) -> Sequence[str]:
-    return spelling(tuple(cell.strip().lower() for cell in _split(place, _delimiter(place))))
+def _names(place: Place) -> tuple[str, ...]:
+    return tuple(cell.strip().lower() for cell in _split(place))
 
 
 def _delimiter(head: Place) -> str:
@@ -256,8 +255,8 @@ def _delimiter(head: Place) -> str:
     return next((each for each in DELIMITERS if each in outside), default)
 
 
-def _split(place: Place, delimiter: str) -> list[str]:
-    text = place.text or ""
+def _split(place: Place, delimiter: str = "") -> list[str]:
+    text, delimiter = place.text or "", delimiter or _delimiter(place)
     if len(text) <= LONGEST_RECORD and delimiter == " ":
         return [whole or bare for whole, bare in _BLANKS.findall(text)]
     if len(text) <= LONGEST_RECORD and '"' not in text:
