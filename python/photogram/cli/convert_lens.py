@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,7 +21,6 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram.network.cameras import Camera
-    from photogram.targets import Conversion
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,9 @@ def convert_lens(
     """
     documents = replace(documents, no_html=True)
     documents.declare(job, pictures=["difference"])
+    from photogram.errors import InputError
     from photogram.targets import convert_lens as fitted
+    from photogram.targets.camera_formats import CAMERA_FORMATS
     from photogram.targets.drawing import plot_difference
     from photogram.targets.lens_fit import KNOTS
 
@@ -70,10 +72,14 @@ def convert_lens(
             intrinsics_only=fit.intrinsics_only,
             knots=fit.knots or KNOTS,
         )
+    files = {"difference.csv": found.to_csv()}
+    for name, make in CAMERA_FORMATS.items() if documents.out is not None else ():
+        with suppress(InputError):  # The format has no such lens
+            files |= {f"{name}/{file}": content for file, content in make(found.rig()).items()}
     documents.conclude(
         job,
         found,
-        _files(found) if documents.out is not None else {},
+        files,
         plots=lambda: {"difference": plot_difference(found.difference)},
         tables=(),
         code=0 if tolerance is None or found.within(tolerance) else NOT_USABLE,
@@ -98,17 +104,3 @@ def _camera(job: Job, path: Path, name: str | None) -> tuple[Camera, tuple[int, 
         raise InputError(phrase("command.no-camera", camera=name, names=names), file=path)
     row = 0 if name is None else names.index(name)
     return shifted(project.block.cameras[row], -MIDDLE), project.sizes[row]
-
-
-def _files(found: Conversion) -> dict[str, bytes]:
-    """Return the output files: the camera in each suitable format."""
-    from photogram.errors import InputError
-    from photogram.targets.camera_formats import CAMERA_FORMATS
-
-    files = {"difference.csv": found.to_csv()}
-    for name, make in CAMERA_FORMATS.items():
-        try:
-            files |= {f"{name}/{file}": content for file, content in make(found.rig()).items()}
-        except InputError:
-            continue
-    return files

@@ -161,7 +161,13 @@ class ColumnTable:
         """Return a column of names, without outer blanks."""
         cells = self._texts(column)
         found = cells if isinstance(cells, NameColumn) else factorised(cells)
-        if found.distinct or _all_apart(found.names):
+        if found.distinct:
+            return found
+        text = "\n".join(found.names).casefold()
+        words = text.split()
+        # Nearly all columns: names without blanks that differ, also by more than case
+        is_plain = len(words) == len(found.names) and text.count("\n") < len(words)
+        if is_plain and len({*words, "nan"}) > len(words):
             return found
         for name in found.names:
             if not name or name.lower() == "nan":
@@ -299,16 +305,6 @@ class ColumnTable:
             if cell and cell.lower() not in TRUE | FALSE:
                 raise self.cell_error(row, column, "error.flag", value=cell)
         return np.array([cell.lower() not in FALSE for cell in cells], dtype=bool)
-
-
-def _all_apart(names: Sequence[str]) -> bool:
-    """Return whether names are valid: no blanks, different ignoring case."""
-    text = "\n".join(names).casefold()
-    words = text.split()
-    if len(words) < len(names) or text.count("\n") >= len(names):
-        return False
-    different = set(words)
-    return len(different) == len(names) == len(words) and "nan" not in different
 
 
 def merged(codes: Indices, texts: list[str]) -> NameColumn:

@@ -51,24 +51,19 @@ def read_text(path: Path) -> str:
 
 
 def decoded(data: bytes, *, whole: bool = True) -> str:
-    """Decode the bytes of a file, or of its start."""
-    for encoding in (_wide(data) or "utf-8-sig", "cp1252"):
+    """Decode the bytes of a file, or of its start: two-byte encodings have a mark or zero bytes."""
+    first, head = "utf-8-sig", data[:HEAD]
+    even, odd = head[::2].count(0), head[1::2].count(0)
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        first = "utf-16"
+    elif not (even and odd) and 4 * max(even, odd) > len(head):
+        first = "utf-16-le" if odd else "utf-16-be"
+    for encoding in (first, "cp1252"):
         try:
             return codecs.getincrementaldecoder(encoding)().decode(data, whole)
         except UnicodeDecodeError:
             continue
     return data.decode("latin-1")
-
-
-def _wide(data: bytes) -> str | None:
-    """Return a two-byte encoding, by its mark or by zero bytes, else None."""
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return "utf-16"
-    head = data[:HEAD]
-    even, odd = head[::2].count(0), head[1::2].count(0)
-    if (even and odd) or 4 * max(even, odd) <= len(head):
-        return None
-    return "utf-16-le" if odd else "utf-16-be"
 
 
 def read_lines(path: Path) -> list[str]:

@@ -143,24 +143,22 @@ def parsed(text: str, file: Path, *, numbers: bool = True) -> Group:
 
 
 def _value(reader: _Reader, key: str, depth: int = 0) -> Value:
-    closing = _OPENING.get(reader.word) if reader.kind == "sign" else None
-    value: Value = _list(reader, key, closing, depth) if closing else _scalar(reader, key)
+    value: Value
+    if closing := _OPENING.get(reader.word) if reader.kind == "sign" else None:
+        if depth == _DEEPEST:
+            raise reader.error("error.nested")
+        start, value = reader.start, []
+        reader.take()
+        while not reader.skip(closing):
+            if value and not reader.skip(","):
+                raise reader.error("pvl.list", start, key=key)
+            value.append(_value(reader, key, depth + 1))
+    else:
+        value = _scalar(reader, key)
     if reader.kind == "unit":
         value = Quantity(value, reader.word.strip())
         reader.take()
     return value
-
-
-def _list(reader: _Reader, key: str, closing: str, depth: int) -> list[Value]:
-    if depth == _DEEPEST:
-        raise reader.error("error.nested")
-    start, values = reader.start, list[Value]()
-    reader.take()
-    while not reader.skip(closing):
-        if values and not reader.skip(","):
-            raise reader.error("pvl.list", start, key=key)
-        values.append(_value(reader, key, depth + 1))
-    return values
 
 
 def _scalar(reader: _Reader, key: str) -> str | int | float:

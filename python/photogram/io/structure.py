@@ -30,8 +30,7 @@ class Encoder:
     """Converter to plain values of one document."""
 
     def __init__(self) -> None:
-        self._written: dict[int, int] = {}
-        self._kept: list[object] = []
+        self._written: dict[int, tuple[int, object]] = {}
 
     def value(self, given: Any) -> Any:
         """Convert a value to JSON."""
@@ -70,10 +69,10 @@ class Encoder:
 
     def _object(self, given: Any) -> dict[str, Any]:
         if id(given) in self._written:
-            return {"same": self._written[id(given)]}
+            return {"same": self._written[id(given)][0]}
         own = {"is": type(given).__name__, **self.fields(given)}
-        self._written[id(given)] = len(self._kept)
-        self._kept.append(given)  # No other object has its id during its lifetime
+        # No other object has its id during its lifetime
+        self._written[id(given)] = len(self._written), given
         return own
 
     def _array(self, given: np.ndarray) -> dict[str, Any]:
@@ -133,10 +132,9 @@ class Decoder:
         name = given["is"]
         if name not in self._classes:
             raise self._error("document.class", name=str(name))
-        own = self.fields({member: each for member, each in given.items() if member != "is"})
         kind = self._classes[name]
+        own = self.fields({member: each for member, each in given.items() if member != "is"}, kind)
         with at_place(Place(self._path)):
-            check_members(kind, own)
             stored = {
                 each.metadata["stored"]: each.name for each in fields(kind) if "stored" in each.metadata
             }

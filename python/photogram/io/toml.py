@@ -7,6 +7,7 @@ import re
 import sys
 import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from datetime import date
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -62,7 +63,11 @@ class TomlFile:
         table = self.content.get(section, {})
         if not isinstance(table, dict):
             raise self.error(section, phrase("error.table", value=value_field(table)))
-        self.content = {**self.content, section: {**table, key: _value(value.strip())}}
+        own: Any = value.strip()
+        # A value without the syntax of TOML is a text, and so are several lines.
+        with suppress(ValueError):
+            (own,) = (own,) if _ENDLESS.search(own) else tomllib.loads(f"value = {own}").values()
+        self.content = {**self.content, section: {**table, key: own}}
         self._replaced[section, key] = text
 
     def _place(self, record: int | None) -> Place:
@@ -256,12 +261,3 @@ def read_document(
             for table in document[name] if name == several else [document[name]]:
                 table.only(known)
     return TomlTree(tables, path, source=source)
-
-
-def _value(text: str) -> Any:
-    """Return a value in TOML syntax, or the text itself."""
-    try:
-        (value,) = tomllib.loads(f"value = {text}").values()
-    except ValueError:  # TOMLDecodeError, and a line with several values
-        return text
-    return text if _ENDLESS.search(text) else value

@@ -142,19 +142,14 @@ def follow(path: Path) -> _Target:
             status = os.stat(path)
         except FileNotFoundError:
             status = None
-    place = os.path.realpath(path)
+    target = _Target(path, os.path.realpath(path), status)
     if path.name in ("", os.pardir) or (status and stat.S_ISDIR(status.st_mode)):
         raise InputError(phrase("file.directory"), file=path)
-    return _Target(path, place, status, _standard_stream(status) if status else None)
-
-
-def _standard_stream(status: os.stat_result) -> int | None:
-    """Return the descriptor of standard output or error, if it is the file with this status."""
-    for descriptor in (1, 2):
+    for descriptor in (2, 1):
         with suppress(OSError):
-            if os.path.samestat(os.fstat(descriptor), status):
-                return descriptor
-    return None
+            if status and os.path.samestat(os.fstat(descriptor), status):
+                target.descriptor = descriptor
+    return target
 
 
 class Guard:
