@@ -74,6 +74,11 @@ def test_import_and_help_load_no_numbers(program, tmp_path):
     assert loaded(program, (*HEAVY, *NUMERICAL, "photogram.giant", "photogram.formats"), tmp_path) == []
 
 
+@pytest.mark.parametrize("command", ["adjust", "calibrate", "collection", "giant", "plan", "simulate"])
+def test_help_of_commands_loads_no_arrays(command, tmp_path):
+    assert loaded(COMMAND.format(arguments=[command, "--help"]), ("numpy", "pandas"), tmp_path) == []
+
+
 @pytest.mark.parametrize("command", ["giant", "adjust"])
 def test_examples_load_what_they_need(command, tmp_path):
     program = COMMAND.format(arguments=[command, "--example", "--no-html", "--quiet"])

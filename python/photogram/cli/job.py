@@ -60,7 +60,7 @@ class Job:
         options: Mapping[str, Any] | None = None,
     ) -> None:
         self._began, self._clock = datetime.now(UTC), time.perf_counter()
-        self._options = dict(options or {})
+        self.given = dict(options or {})  # Values that are not defaults, by names of options
         given = paths or {}
         self._files, self._projects, self._outputs, self._directories = (
             [*given.get(role, ())] for role in (Reads.FILE, Reads.PROJECT, Writes.FILE, Writes.DIRECTORY)
@@ -84,19 +84,14 @@ class Job:
 
     def alone(self, option: str, others: Collection[str]) -> None:
         """Reject an option in combination with others; the message names them."""
-        if typed := [name for name in self._options if name in others]:
+        if typed := [name for name in self.given if name in others]:
             raise misuse(option, "conflict", options=typed)
 
     def only(self, permitted: Collection[str], code: str, **fields: Any) -> None:
         """Reject all options and arguments except some; `code` is one of the family `usage`."""
-        for name in self._options:
+        for name in self.given:
             if name not in permitted:
                 raise misuse(name, code, **fields)
-
-    @property
-    def given(self) -> Mapping[str, Any]:
-        """Values of the command line that are not defaults, by names of options."""
-        return self._options
 
     def packaged(self, *example: str) -> Path:
         """Return a packaged example, a file or a directory, for as long as the job lasts."""
@@ -194,7 +189,7 @@ class Job:
             of_each(inputs, "size", (Axis.of("", "bytes"),), "deviation", head="Size", decimals=0),
             of_each(inputs, "sha256", (), "name", head="SHA-256"),
         ]
-        options = [Fact(name, printable(value)) for name, value in self._options.items()]
+        options = [Fact(name, printable(value)) for name, value in self.given.items()]
         run = [
             Fact("Command", printable(f"photogram {self.name}")),
             Fact("Began", self._began.strftime("%Y-%m-%d %H:%M:%S"), "UTC"),
