@@ -82,7 +82,7 @@ def test_a_limit_of_the_host_is_an_error_of_the_record():
         with pytest.raises(
             InputError, match=r"record 7: the file must be valid CSV; correct this error: field larger than"
         ):
-            cells(Place(Path("a.csv"), 7, "12345678901,2"))
+            cells(Place(Path("a.csv"), 7, '"12345678901",2'))
     finally:
         csv.field_size_limit(before)
 

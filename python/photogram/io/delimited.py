@@ -167,6 +167,10 @@ def cells(place: Place, delimiter: str = ",", *, blanks: bool = False) -> list[s
     text = place.text or ""
     if len(text) > LONGEST_RECORD:
         raise place.error(phrase("error.too-long", length=len(text), most=LONGEST_RECORD))
+    if delimiter == " ":
+        return [whole or bare for whole, bare in _BLANKS.findall(text)]
+    if '"' not in text:
+        return [cell.strip() for cell in text.split(delimiter)] if text else []
     try:
         row = next(csv.reader([text], delimiter=delimiter, skipinitialspace=blanks))
     except csv.Error as error:
@@ -255,13 +259,8 @@ def _delimiter(head: Place) -> str:
     return next((each for each in DELIMITERS if each in outside), default)
 
 
-def _split(place: Place, delimiter: str = "") -> list[str]:
-    text, delimiter = place.text or "", delimiter or _delimiter(place)
-    if len(text) <= LONGEST_RECORD and delimiter == " ":
-        return [whole or bare for whole, bare in _BLANKS.findall(text)]
-    if len(text) <= LONGEST_RECORD and '"' not in text:
-        return [cell.strip() for cell in text.split(delimiter)]
-    return cells(place, delimiter, blanks=True)
+def _split(place: Place) -> list[str]:
+    return cells(place, _delimiter(place), blanks=True)
 
 
 def _by_lines(
@@ -290,17 +289,17 @@ def _by_lines(
         if not line.strip() or line.lstrip().startswith(COMMENT):
             continue
         place = Place(path, record, line)
-        cells = _split(place, delimiter)
-        cells += [""] * (width - len(cells)) if ragged else []
-        if len(cells) != width:
+        row = cells(place, delimiter, blanks=True)
+        row += [""] * (width - len(row)) if ragged else []
+        if len(row) != width:
             # A delimiter at the end of every line produces an additional empty cell.
-            if len(cells) == width + 1 and not cells[-1]:
-                cells.pop()
-            elif not rows and len(cells) == width + 1 and is_shifted(cells):
+            if len(row) == width + 1 and not row[-1]:
+                row.pop()
+            elif not rows and len(row) == width + 1 and is_shifted(row):
                 width += 1
             else:
-                raise place.error(phrase("error.cells", count=len(cells), columns=width))
-        rows.append(cells)
+                raise place.error(phrase("error.cells", count=len(row), columns=width))
+        rows.append(row)
         records.append(record)
     return rows, records
 
