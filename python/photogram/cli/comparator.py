@@ -7,6 +7,7 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -51,6 +52,7 @@ def comparator(
     """
     from photogram.comparator import calibrate, find_grid, listing, read
     from photogram.errors import InputError
+    from photogram.show.page import Fact
     from photogram.statistics.verdict import worst
 
     left_handed = None if hand == "file" else hand == "left"
@@ -72,8 +74,13 @@ def comparator(
         reason = {"comparator": one.session.comparator, "reason": one.verdict.headline}
         withheld = phrase("command.correction-withheld", **reason)
         files |= own.unless_withheld(_corrections(one), withheld, usable=one.usable)
-        if pdf and plots:
-            files |= own.inside(_pdf(job, one, run_date))
+        if pdf and plots and find_spec("typst"):
+            from photogram.show.pdf import page_pdf
+
+            page = replace(one.document(), head=[Fact("Date of the run", run_date)])
+            files |= own.inside({"report.pdf": page_pdf(page)})
+        elif pdf and plots:
+            job.remark(phrase("command.no-file", name="report.pdf", extra="pdf"))
         if documents.html is not None or (plots and not pdf):
             mark = f"-{number}" if documents.html is not None and several else ""
             files |= own.page(job, replace(one, messages=job.told(one.messages)).document, mark)
@@ -119,20 +126,6 @@ def _run_date(date: str | None) -> str:
         return datetime.fromtimestamp(seconds, UTC).date().isoformat()
     except (ValueError, OverflowError, OSError):
         raise InputError(phrase("command.epoch", value=epoch)) from None
-
-
-def _pdf(job: Job, calibration: Calibration, run_date: str) -> dict[str, bytes]:
-    """Return the report as PDF; none, with a remark, if a package is missing."""
-    from photogram.show.page import Fact
-
-    try:
-        from photogram.show.pdf import page_pdf
-
-        page = replace(calibration.document(), head=[Fact("Date of the run", run_date)])
-        return {"report.pdf": page_pdf(page)}
-    except ModuleNotFoundError:
-        job.remark(phrase("command.no-file", name="report.pdf", extra="pdf"))
-        return {}
 
 
 @with_job("comparator correct")
