@@ -99,7 +99,7 @@ def test_batches_of_decks(run, tmp_path):
 
 
 def test_pdf_and_other_choices(run, tables):
-    pytest.importorskip("reportlab")
+    pytest.importorskip("typst")
     result = run(*tables, "--out", "out", "--pdf", "--as-published", "--linear-only", "--estimate-grid")
     assert result.exit_code == 0, result.output
     assert names("out") == TEXTS | {"report.pdf", "grid-1.csv", "grid-1-joint.csv"}
