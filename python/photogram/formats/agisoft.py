@@ -27,7 +27,6 @@ from photogram.formats.project import Frame, Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place, image_size, one_word, positive
-from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
@@ -36,15 +35,16 @@ from photogram.words import Phrase, option_sd, phrase
 
 LOCAL = "LOCAL_CS"
 GEOCENTRIC = 1e6  # Distance from the origin (m) beyond which a world is geocentric
-_TERMS = ("cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2")
+_TERMS = ("f", "cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
+_Similarity = tuple[Floats, Floats, float]  # R, T, s of X_world = s R X_chunk + T
 
 
-class _Similarity(NamedTuple):
-    """X_world = s R X_chunk + T."""
+class _Reference(NamedTuple):
+    """The reference of a camera or marker; standard deviations of 0 or NaN are unknown."""
 
-    rotation: Floats
-    translation: Floats
-    scale: float
+    xyz: Floats
+    sd: Floats
+    enabled: bool
 
 
 def read(path: Path, options: ReadOptions) -> Project:
@@ -65,9 +65,9 @@ def read(path: Path, options: ReadOptions) -> Project:
         np.broadcast_to(options.sd.get(kind, (settings.get(f"accuracy_{name}", np.nan),)), 3)
         for kind, name in (("gnss", "cameras"), ("control", "markers"))
     )
-    _gnss(block, shots, system, gnss_sd)
-    _markers(block, markers, system, control_sd)
-    _locations(chunk, block)
+    if system is not None:
+        _gnss(block, shots, system, gnss_sd)
+    _markers(chunk, block, markers, system, control_sd)
     return block.project()
 
 
@@ -115,19 +115,22 @@ def _sensor(element: Element, name: str, messages: list[Message]) -> tuple[Camer
         if not pixel or "focal_length" not in properties:
             raise element.error(phrase("agisoft.calibration"))
         values["f"] = properties["focal_length"] / pixel
-    elif calibration.child("fx") is not None:
-        fx, fy = calibration.number("fx"), calibration.number("fy")
-        values |= {term: calibration.number(term, 0.0) for term in ("k1", "k2", "k3", "k4", "p1", "p2")}
-        values |= {"f": fy, "b1": fx - fy, "b2": calibration.number("skew", 0.0)}
-        values |= {"cx": calibration.number("cx") - width / 2, "cy": calibration.number("cy") - height / 2}
-        if values["p1"] or values["p2"]:
-            messages.append(Message(phrase("agisoft.exchanged", camera=name)))
     else:
-        values |= {"f": calibration.number("f")} | {term: calibration.number(term, 0.0) for term in _TERMS}
-    model = f"agisoft_{kind}"
-    further = {term: 0.0 if calibration is None else calibration.number(term, 0.0) for term in ("p3", "p4")}
-    if any(further.values()):
-        model, values = f"{model}_p4", values | further
+        values |= {term: calibration.number(term, 0.0) for term in _TERMS[1:]}
+        if calibration.child("fx") is None:
+            values["f"] = calibration.number("f")
+        else:
+            fx, fy = calibration.number("fx"), calibration.number("fy")
+            values |= {"f": fy, "b1": fx - fy, "b2": calibration.number("skew", 0.0)}
+            values |= {
+                "cx": calibration.number("cx") - width / 2,
+                "cy": calibration.number("cy") - height / 2,
+            }
+            if values["p1"] or values["p2"]:
+                messages.append(Message(phrase("agisoft.exchanged", camera=name)))
+    model, further = f"agisoft_{kind}", [values.pop(term, 0.0) for term in _TERMS[-2:]]
+    if any(further):
+        model, values = f"{model}_p4", values | dict(zip(_TERMS[-2:], further, strict=True))
     return Camera(model, values, name=name), size, pixel
 
 
@@ -150,24 +153,6 @@ def _shots(chunk: Element, block: BlockBuilder) -> list[Element]:
     return found
 
 
-def _poses(chunk: Element, shots: list[Element]) -> tuple[Floats, Floats]:
-    """Return centres and attitudes in the world."""
-    whole = _similarity(chunk.child("transform")) or _Similarity(np.eye(3), np.zeros(3), 1.0)
-    components = {
-        each.attributes.get("id"): _similarity(each.child("transform"))
-        for each in _members(chunk, "components", "component")
-    }
-    centres, matrices = np.empty((len(shots), 3)), np.empty((len(shots), 3, 3))
-    for row, each in enumerate(shots):
-        transform = each.need("transform")
-        values = transform.numbers(16).reshape(4, 4)
-        turn = checked_rotation(transform, values[:3, :3])
-        similarity = components.get(each.attributes.get("component_id")) or whole
-        matrices[row] = similarity.rotation @ turn @ Y_DOWN
-        centres[row] = similarity.scale * similarity.rotation @ values[:3, 3] + similarity.translation
-    return centres, matrices
-
-
 def _similarity(element: Element | None) -> _Similarity | None:
     """Return the similarity of a transform; None without a rotation."""
     rotation = None if element is None else element.child("rotation")
@@ -176,7 +161,7 @@ def _similarity(element: Element | None) -> _Similarity | None:
     scale = positive(element, "the scale", element.number("scale", 1.0))
     shift = element.child("translation")
     translation = np.zeros(3) if shift is None else shift.numbers(3)
-    return _Similarity(checked_rotation(rotation, rotation.numbers(9).reshape(3, 3)), translation, scale)
+    return checked_rotation(rotation, rotation.numbers(9).reshape(3, 3)), translation, scale
 
 
 def _with_poses(
@@ -186,9 +171,21 @@ def _with_poses(
 
     Returns the system of references; None if they cannot be transformed.
     """
-    centres, matrices = _poses(chunk, shots)
+    whole = _similarity(chunk.child("transform")) or (np.eye(3), np.zeros(3), 1.0)
+    components = {
+        each.attributes.get("id"): _similarity(each.child("transform"))
+        for each in _members(chunk, "components", "component")
+    }
+    centres, matrices = np.empty((len(shots), 3)), np.empty((len(shots), 3, 3))
+    for row, each in enumerate(shots):
+        transform = each.need("transform")
+        values = transform.numbers(16).reshape(4, 4)
+        turn = checked_rotation(transform, values[:3, :3])
+        rotation, translation, scale = components.get(each.attributes.get("component_id")) or whole
+        matrices[row] = rotation @ turn @ Y_DOWN
+        centres[row] = scale * rotation @ values[:3, 3] + translation
     system = chunk.word("reference")
-    given = [own[0] for each in (*shots, *markers) if (own := _reference(each, np.ones(3))) is not None]
+    given = [own.xyz for each in (*shots, *markers) if (own := _reference(each, np.ones(3))) is not None]
     # A world is geocentric, judged by its size, its system or the range of its references.
     degrees = np.abs(np.array(given).reshape(-1, 3)[:, :2]) <= (360.0, 90.0)
     far = np.linalg.norm(centres.mean(axis=0)) >= GEOCENTRIC and not system.upper().startswith(LOCAL)
@@ -207,8 +204,8 @@ def _with_poses(
     return None
 
 
-def _reference(element: Element, default: Floats) -> tuple[Floats, Floats] | None:
-    """Return a reference and its standard deviations; None if missing."""
+def _reference(element: Element, default: Floats) -> _Reference | None:
+    """Return a reference; None if missing."""
     own = element.child("reference")
     if own is None or any(axis not in own.attributes for axis in "xyz"):
         return None
@@ -218,30 +215,27 @@ def _reference(element: Element, default: Floats) -> tuple[Floats, Floats] | Non
     for name, axes in (("sxyz", 3), ("sxy", 2)):
         if name in own.attributes:
             sd[:axes] = own.attribute(name)
-    return position, np.array([own.attribute(f"s{axis}", float(sd[k])) for k, axis in enumerate("xyz")])
+    sd = np.array([own.attribute(f"s{axis}", float(sd[k])) for k, axis in enumerate("xyz")])
+    return _Reference(position, sd, own.attributes.get("enabled", "true").lower() not in ("false", "0"))
 
 
-def _enabled(element: Element) -> bool:
-    own = element.child("reference")
-    return own is not None and own.attributes.get("enabled", "true").lower() not in ("false", "0")
-
-
-def _gnss(block: BlockBuilder, shots: list[Element], system: str | None, default: Floats) -> None:
+def _gnss(block: BlockBuilder, shots: list[Element], system: str, default: Floats) -> None:
     lost = 0
     for each in shots:
-        reference = _reference(each, default)
-        if system is None or reference is None or not _enabled(each):
+        if (reference := _reference(each, default)) is None or not reference.enabled:
             continue
-        xyz, sd = reference
-        if (sd > 0).all():
-            block.gnss(each.attributes["id"], xyz, sd, each, crs=system)
+        if (reference.sd > 0).all():
+            block.gnss(each.attributes["id"], reference.xyz, reference.sd, each, crs=system)
         else:
             lost += 1
     if lost:
         block.lacks.append(Phrase("read.references", {"number": lost, "option": option_sd("gnss")}))
 
 
-def _markers(block: BlockBuilder, markers: list[Element], system: str | None, default: Floats) -> None:
+def _markers(
+    chunk: Element, block: BlockBuilder, markers: list[Element], system: str | None, default: Floats
+) -> None:
+    """Add markers, and their manual measurements; predicted locations are not observations."""
     for row, marker in enumerate(markers):
         key = marker.attributes.get("id", "")
         name = marker.attributes.get("label") or f"marker {row}"
@@ -249,17 +243,13 @@ def _markers(block: BlockBuilder, markers: list[Element], system: str | None, de
         reference = _reference(marker, default)
         if system is None or reference is None:
             continue
-        xyz, sd = reference
-        if not _enabled(marker):
+        xyz, sd, enabled = reference
+        if not enabled:
             block.control(key, xyz, np.where(sd > 0, sd, np.nan), marker, crs=system, check=True)
         elif not (sd > 0).all():
             raise marker.error(phrase("format.sd", name=name, option=option_sd("control")))
         else:
             block.control(key, xyz, sd, marker, crs=system)
-
-
-def _locations(chunk: Element, block: BlockBuilder) -> None:
-    """Add manual measurements; predicted locations are not observations."""
     for frame in _members(chunk, "frames", "frame"):
         for marker in _members(frame, "markers", "marker"):
             point = marker.attributes.get("marker_id", "")
@@ -273,7 +263,6 @@ def _locations(chunk: Element, block: BlockBuilder) -> None:
 LOCAL_SYSTEM = (
     'LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],UNIT["metre",1,AUTHORITY["EPSG","9001"]]]'
 )
-_WRITTEN_TERMS = ("f", "cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
@@ -295,6 +284,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     if not known_poses(block).any():
         raise InputError(phrase("format.poses"))
     world = _world(project.frame)
+    system = (world.crs or LOCAL_SYSTEM).replace('"', "&quot;")
     cameras, which = known_cameras(block)
     sensors = enumerate(zip(cameras, project.sizes, project.pixel_mm, strict=True))
     lines = [
@@ -312,7 +302,7 @@ def write(project: Project) -> Mapping[str, bytes]:
         "</components>",
         *_written_shots(project, world, which),
         *_written_markers(project, world),
-        f"<reference>{world.text}</reference>",
+        f"<reference>{system}</reference>",
         "</chunk>",
         "</document>",
         "",
@@ -320,13 +310,11 @@ def write(project: Project) -> Mapping[str, bytes]:
     return {FORMATS["agisoft"].files[0]: "\n".join(lines).encode()}
 
 
-@dataclass(frozen=True)
-class _World:
-    """The transformation X_world = R X + T of the chunk, and the reference system."""
+class _World(NamedTuple):
+    """The transformation X_world = R X + T of the chunk, and the system of references; empty: local."""
 
     rotation: Floats
     translation: Floats
-    text: str
     crs: str
     frame: Frame
 
@@ -341,14 +329,14 @@ class _World:
 
 def _world(frame: Frame) -> _World:
     if frame.kind == "cartesian" or (frame.kind == "topocentric" and frame.origin is None):
-        return _World(np.eye(3), np.zeros(3), LOCAL_SYSTEM.replace('"', "&quot;"), "", frame)
+        return _World(np.eye(3), np.zeros(3), "", frame)
     from photogram.formats.crs import east_north_up, from_frame
 
     rotation, translation = np.eye(3), np.zeros(3)
     if frame.origin is not None and frame.kind == "topocentric":
         rotation = east_north_up(frame.origin).T
         translation = from_frame(EARTH, np.zeros((1, 3)), np.zeros((1, 3, 3)), frame)[0][0]
-    return _World(rotation, translation, GEOGRAPHIC, GEOGRAPHIC, frame)
+    return _World(rotation, translation, GEOGRAPHIC, frame)
 
 
 def _numbers(values: Floats) -> str:
@@ -365,7 +353,7 @@ def _written_sensor(row: int, camera: Camera, size: Size | None, pixel: float | 
         if "f" in values:
             lines.append(f'<property name="focal_length" value="{values["f"] * pixel!r}"/>')
     if values:
-        terms = "".join(f"<{name}>{values[name]!r}</{name}>" for name in _WRITTEN_TERMS if name in values)
+        terms = "".join(f"<{name}>{values[name]!r}</{name}>" for name in _TERMS if name in values)
         lines += [f'<calibration type="{kind}" class="adjusted">', extent, terms, "</calibration>"]
     return [*lines, "</sensor>"]
 
@@ -380,19 +368,9 @@ def _calibration(camera: Camera, size: Size | None) -> tuple[str, Mapping[str, f
     lens = lens_with(camera, size, "Metashape", "k1", "k2", "k3", "p1", "p2")
     size = known_size(camera, size)
     # p1 is the coefficient of r^2 + 2 x^2 in Metashape.
-    return "frame", {
-        "f": lens.fy,
-        "cx": lens.cx - size[0] / 2,
-        "cy": lens.cy - size[1] / 2,
-        "b1": lens.fx - lens.fy,
-        "b2": 0.0,
-        "k1": lens.k1,
-        "k2": lens.k2,
-        "k3": lens.k3,
-        "k4": 0.0,
-        "p1": lens.p2,
-        "p2": lens.p1,
-    }
+    values = {"f": lens.fy, "cx": lens.cx - size[0] / 2, "cy": lens.cy - size[1] / 2, "b1": lens.fx - lens.fy}
+    values |= {"k1": lens.k1, "k2": lens.k2, "k3": lens.k3, "p1": lens.p2, "p2": lens.p1}
+    return "frame", {"b2": 0.0, "k4": 0.0} | values
 
 
 def _written_shots(project: Project, world: _World, which: list[int]) -> list[str]:
@@ -448,18 +426,10 @@ def _written_markers(project: Project, world: _World) -> list[str]:
         name = quoteattr(project.block.point_ids[known.rows[row]])
         reference = _written_reference(positions[k], sd, bool(known.checks[row]))
         lines.append(f'<marker id="{k}" label={name}>{reference}</marker>')
-    markers = {known.rows[row]: k for k, row in enumerate(own)}
-    return [*lines, "</markers>", *_written_locations(project, markers)]
-
-
-def _written_locations(project: Project, markers: Mapping[int, int]) -> list[str]:
-    shown = known_poses(project.block)
-    images: dict[int, list[str]] = {k: [] for k in markers.values()}
+    lines += ["</markers>", '<frames next_id="1">', '<frame id="0">', "<markers>"]
+    shown, images = known_poses(project.block), {known.rows[row]: list[str]() for row in own}
     for photo, point, x, y in pixel_rows(project):
-        if point in markers and shown[photo]:
-            images[markers[point]].append(
-                f'<location camera_id="{photo}" pinned="true" x="{x!r}" y="{y!r}"/>'
-            )
-    lines = ['<frames next_id="1">', '<frame id="0">', "<markers>"]
-    lines += [f'<marker marker_id="{k}">{"".join(own)}</marker>' for k, own in images.items()]
+        if point in images and shown[photo]:
+            images[point].append(f'<location camera_id="{photo}" pinned="true" x="{x!r}" y="{y!r}"/>')
+    lines += [f'<marker marker_id="{k}">{"".join(each)}</marker>' for k, each in enumerate(images.values())]
     return [*lines, "</markers>", "</frame>", "</frames>"]
