@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from photogram import formats
-from photogram.formats.colmap.content import FEATURE, POINT, Camera, Image, Model
-from photogram.formats.colmap.files import binary_files, read_model
+from photogram.formats.colmap.files import FEATURE, POINT, Camera, Image, Model, binary_files, read_model
 from photogram.formats.isis.network import ControlMeasures, ControlNetwork, ControlPoints, read_network
 from photogram.formats.isis.writing import binary_network, network_text
 from photogram.io.delimited import read_columns

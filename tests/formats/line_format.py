@@ -6,24 +6,20 @@ control  POINT X Y Z sd
 image    PHOTO POINT COLUMN ROW        pixels from the upper-left corner
 """
 
-from collections.abc import Mapping
-from functools import partial
-from pathlib import Path
-
 import numpy as np
 
 from photogram import Attitudes, Camera
-from photogram.formats import Format, Project, ReadOptions
+from photogram.formats import Format
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import cards
 from photogram.formats.images import lens_with, named_pixels, sizes_of
 from photogram.formats.recognition import has_suffix
 from photogram.io.places import image_size, one_word
 
-FILE, TITLE = "block.lines", "file of lines"
+TITLE, CONTENTS = "file of lines", frozenset({"names", "shared-cameras", "control"})
 
 
-def read(path: Path, options: ReadOptions) -> Project:
+def read(path, options):
     """Read a file; errors of the builder name the line."""
     block = BlockBuilder(path, TITLE)
     for card in cards(path):
@@ -33,9 +29,9 @@ def read(path: Path, options: ReadOptions) -> Project:
             camera = Camera("simple_pinhole", {"f": f, "cx": cx, "cy": cy}, name=name)
             block.camera(camera, image_size(card.place, *size), place=card.place)
         elif kind == "photo":
-            block.photo(name, other, card.place)
             values = card.numbers(3, "X Y Z o p k")
-            attitude = Attitudes.of("omega_phi_kappa", np.radians(values[np.newaxis, 3:]))
+            attitude = Attitudes.of("omega_phi_kappa", np.radians([values[3:]]))
+            block.photo(name, other, card.place)
             block.pose(name, values[:3], attitude.matrices[0])
         elif kind == "control":
             block.control(name, card.numbers(2, "X Y Z"), card.number(5, "sd"), card.place)
@@ -44,28 +40,20 @@ def read(path: Path, options: ReadOptions) -> Project:
     return block.project()
 
 
-def write(project: Project) -> Mapping[str, bytes]:
+def write(project):
     """Return the file; image coordinates are in pixels already."""
-    block, rows = project.block, list[tuple[object, ...]]()
+    block, rows = project.block, []
     for camera, size in zip(block.cameras, sizes_of(project), strict=True):
-        lens = lens_with(camera, size, TITLE)
-        rows.append(("camera", camera.name, lens.fx, lens.cx, lens.cy, *size))
+        lens, _ = lens_with(camera, size, TITLE)
+        rows.append(("camera", camera.name, lens.focal[0], *lens.centre, *size))
     poses = np.hstack([block.photo_positions, np.degrees(block.photo_attitudes)]).tolist()
     for name, row, pose in zip(block.photo_ids, block.photo_cameras, poses, strict=True):
         rows.append(("photo", name, block.camera_names[row], *pose))
     for name, xyz, sd in zip(block.point_ids, block.point_positions.tolist(), block.point_sd, strict=True):
         rows += [("control", name, *xyz, float(sd.max()))] if np.isfinite(sd).all() else []
     rows += [("image", *observed) for observed in named_pixels(project)]
-    return {FILE: "".join(f"{' '.join(map(str, row))}\n" for row in rows).encode()}
+    return {"block.lines": "".join(f"{' '.join(map(str, row))}\n" for row in rows).encode()}
 
 
-FORMAT = Format(
-    name="lines",
-    title=TITLE,
-    recognises=partial(has_suffix, ".lines"),
-    read=read,
-    write=write,
-    files=(FILE, "*.lines"),
-    holds=frozenset({"names", "shared-cameras", "control"}),
-    pixels=True,
-)
+FILES, recognises = ("block.lines", "*.lines"), lambda path: has_suffix(".lines", path)
+FORMAT = Format("lines", TITLE, recognises, read, write, files=FILES, pixels=True, holds=CONTENTS)

@@ -20,7 +20,7 @@ from test_plain_project import EXAMPLE, written
 
 from message_codes import refused
 from photogram import Attitudes, Camera, InnerConstraints, adjust, formats
-from photogram.formats.colmap.content import MODELS
+from photogram.formats.colmap.files import MODELS
 from photogram.formats.description import agreement
 
 
@@ -147,10 +147,13 @@ def test_control_by_names_carries_a_model_in_a_frame_of_its_own(run, tmp_path):
 
 
 def test_rotations_of_the_sidecar_are_those_of_the_cameras_axes():
-    from photogram.formats.colmap.models import _centre_and_rotation
-
-    result = adjust(formats.read(EXAMPLE).block)
-    covariances = _centre_and_rotation(result)
+    project = formats.read(EXAMPLE)
+    result = adjust(project.block)
+    content = formats.FORMATS["colmap"].results(project, result)["photo_covariances.bin"]
+    table = np.frombuffer(content, [("id", "<u4"), ("c", "<f8", 21)], offset=8)
+    assert table["id"].tolist() == list(range(1, len(project.block.photo_ids) + 1))
+    covariances, (rows, columns) = np.zeros((len(table), 6, 6)), np.tril_indices(6)
+    covariances[:, rows, columns] = covariances[:, columns, rows] = table["c"]
     flip = np.diag([1.0, -1.0, -1.0])
 
     def small(angles, base):

@@ -16,7 +16,7 @@ from photogram.words import Phrase
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
 crs = pytest.importorskip("photogram.formats.crs")
-places = pytest.importorskip("photogram.formats.crs_results")
+places = pytest.importorskip("photogram.formats.results")
 
 CONTROL = ["north-1", "north-2", "south-1", "south-2"]
 FRAME = Frame("topocentric", "EPSG:4979", (47.38, 8.54, 450.0))

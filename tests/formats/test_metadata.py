@@ -18,7 +18,6 @@ from photogram.formats.metadata.record import (
     ELLIPSOIDAL,
     SEA_LEVEL,
     UNSAID,
-    fix_of,
     is_reference,
     number_of,
     read_exposures,
@@ -133,7 +132,6 @@ def test_attributes_and_elements_are_read_alike_by_their_namespace(tmp_path, nes
     ],
 )
 def test_flags_have_their_meaning(flag, fix, tmp_path):
-    assert fix_of(flag) == fix
     said = said_by_packet(packet(dji(8.5, 47.3, 500.0, flag=flag)), tmp_path)
     assert said.fix == fix
     assert (said.sd is None) == (fix == "none")

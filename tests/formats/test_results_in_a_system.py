@@ -16,7 +16,7 @@ from photogram.giant import Project, write_project
 
 pyproj = pytest.importorskip("pyproj", reason="pyproj is not installed")
 crs = pytest.importorskip("photogram.formats.crs")
-places = pytest.importorskip("photogram.formats.crs_results")
+places = pytest.importorskip("photogram.formats.results")
 
 FRAME = Frame("topocentric", "EPSG:4979", (47.38, 8.54, 450.0))
 UTM = "EPSG:32632"

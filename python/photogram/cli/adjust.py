@@ -79,7 +79,7 @@ def adjust(
     if not job.quiet:
         print_sections(description, "`photogram info`")
     if documents.crs is not None:
-        from photogram.formats.crs_results import check_place
+        from photogram.formats.results import check_place
 
         check_place(project.block, documents.crs)
     block, started = started_block(project, keep_all=keep_all)
@@ -129,7 +129,7 @@ def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[s
     if not (crs or of_control):
         return {}, []
     from photogram import InputError
-    from photogram.formats.crs_results import placed, placed_files, placed_section
+    from photogram.formats.results import placed, placed_files, placed_section
 
     try:
         found = placed(result, crs or of_control)

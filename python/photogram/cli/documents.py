@@ -138,8 +138,8 @@ class Documents:
             files |= charts
             job.remark(*remarks)
         if self.ply is not None:
-            from photogram.formats.crs_results import placed
             from photogram.formats.maps import point_cloud
+            from photogram.formats.results import placed
 
             in_crs = placed(result, self.crs) if self.crs is not None and isinstance(result, Result) else None
             files[self.ply] = point_cloud(result, in_crs, origin=self.ply_origin or (0.0, 0.0, 0.0))

@@ -163,13 +163,5 @@ def _tables(block: Block, out: Path, *, overwrite: bool) -> dict[Path, bytes]:
 
     if (out / "project.toml").exists() and not overwrite:
         raise InputError(phrase("command.project-exists"), file=out)
-    unknown = (None,) * max(1, len(block.cameras))
-    project = Project(
-        block=block,
-        path=out,
-        title="simulated",
-        sizes=unknown,
-        pixel_mm=unknown,
-        starts=block.point_positions,
-    )
+    project = Project(block=block, path=out, title="simulated")
     return {out / name: content for name, content in write(project).items()}

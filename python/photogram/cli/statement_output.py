@@ -105,7 +105,7 @@ def stated(
     from datetime import date
 
     from photogram import statement as made
-    from photogram.formats.crs_results import placed
+    from photogram.formats.results import placed
     from photogram.results.statement.comparison import System
 
     system = None

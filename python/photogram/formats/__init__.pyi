@@ -3,8 +3,6 @@ from . import isis as isis
 from . import maps as maps
 from .crs import from_frame as from_frame
 from .crs import to_frame as to_frame
-from .crs_results import Placed as Placed
-from .crs_results import placed as placed
 from .format import FORMATS as FORMATS
 from .format import Format as Format
 from .metadata.merged import Metadata as Metadata
@@ -22,3 +20,5 @@ from .registry import read as read
 from .registry import recognised as recognised
 from .registry import target as target
 from .registry import to_files as to_files
+from .results import Placed as Placed
+from .results import placed as placed

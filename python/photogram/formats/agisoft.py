@@ -23,13 +23,14 @@ from photogram.formats.models import (
     known_cameras,
     known_points,
 )
-from photogram.formats.project import Frame, Project, Size
+from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place, image_size, one_word, positive
 from photogram.messages import Message
 from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
+from photogram.network.frame import Frame
 from photogram.network.observations import Position
 from photogram.words import Phrase, option_sd, phrase
 
@@ -54,9 +55,19 @@ def read(path: Path, options: ReadOptions) -> Project:
     block.remarks_on_systems = False  # Metashape defines heights of its systems
     block.lacks.append(Phrase("read.ties"))
     chunks = [*root.all("chunk"), *_members(root, "chunks", "chunk")]
-    names = [each.attributes.get("label", "?") for each in chunks]
-    chunk = chunks[chosen_model(root, names, options.model, 0, block.messages)]
-    _sensors(chunk, block)
+    labels = [each.attributes.get("label", "?") for each in chunks]
+    chunk = chunks[chosen_model(root, labels, options.model, 0, block.messages)]
+    names = list[str]()
+    for each in _members(chunk, "sensors", "sensor"):
+        key = each.attributes.get("id", "")
+        name = each.attributes.get("label") or f"sensor {key}"
+        while name in names:
+            name += "'"
+        names.append(name)
+        with at_place(each):
+            block.camera(*_sensor(each, name, block.messages), key=key, place=each)
+    if not names:
+        raise chunk.error(phrase("format.missing", what="sensors"))
     shots = _shots(chunk, block)
     markers = _members(chunk, "markers", "marker")
     system = _with_poses(chunk, shots, markers, block)
@@ -65,8 +76,15 @@ def read(path: Path, options: ReadOptions) -> Project:
         np.broadcast_to(options.sd.get(kind, (settings.get(f"accuracy_{name}", np.nan),)), 3)
         for kind, name in (("gnss", "cameras"), ("control", "markers"))
     )
-    if system is not None:
-        _gnss(block, shots, system, gnss_sd)
+    lost = 0
+    for shot in shots if system is not None else ():
+        if (reference := _reference(shot, gnss_sd)) is not None and reference.enabled:
+            if (reference.sd > 0).all():
+                block.gnss(shot.attributes["id"], reference.xyz, reference.sd, shot, crs=system or "")
+            else:
+                lost += 1
+    if lost:
+        block.lacks.append(Phrase("read.references", {"number": lost, "option": option_sd("gnss")}))
     _markers(chunk, block, markers, system, control_sd)
     return block.project()
 
@@ -82,20 +100,6 @@ def _members(chunk: Element, folder: str, name: str) -> list[Element]:
     if found is None:
         return []
     return [own for each in found.children for own in ([each] if each.name == name else each.all(name))]
-
-
-def _sensors(chunk: Element, block: BlockBuilder) -> None:
-    names: set[str] = set()
-    for each in _members(chunk, "sensors", "sensor"):
-        key = each.attributes.get("id", "")
-        name = each.attributes.get("label") or f"sensor {key}"
-        while name in names:
-            name += "'"
-        names.add(name)
-        with at_place(each):
-            block.camera(*_sensor(each, name, block.messages), key=key, place=each)
-    if not block.cameras:
-        raise chunk.error(phrase("format.missing", what="sensors"))
 
 
 def _sensor(element: Element, name: str, messages: list[Message]) -> tuple[Camera, Size, float | None]:
@@ -217,19 +221,6 @@ def _reference(element: Element, default: Floats) -> _Reference | None:
             sd[:axes] = own.attribute(name)
     sd = np.array([own.attribute(f"s{axis}", float(sd[k])) for k, axis in enumerate("xyz")])
     return _Reference(position, sd, own.attributes.get("enabled", "true").lower() not in ("false", "0"))
-
-
-def _gnss(block: BlockBuilder, shots: list[Element], system: str, default: Floats) -> None:
-    lost = 0
-    for each in shots:
-        if (reference := _reference(each, default)) is None or not reference.enabled:
-            continue
-        if (reference.sd > 0).all():
-            block.gnss(each.attributes["id"], reference.xyz, reference.sd, each, crs=system)
-        else:
-            lost += 1
-    if lost:
-        block.lacks.append(Phrase("read.references", {"number": lost, "option": option_sd("gnss")}))
 
 
 def _markers(
@@ -365,12 +356,11 @@ def _calibration(camera: Camera, size: Size | None) -> tuple[str, Mapping[str, f
     if camera.model.startswith("agisoft_"):
         values = {name: value for name, value in camera.parameters.items() if name not in ("w", "h")}
         return camera.model.split("_")[1], values
-    lens = lens_with(camera, size, "Metashape", "k1", "k2", "k3", "p1", "p2")
-    size = known_size(camera, size)
+    lens, terms = lens_with(camera, size, "Metashape", "k1", "k2", "k3", "p1", "p2")
+    (fx, fy), (cx, cy), (width, height) = lens.focal, lens.centre, known_size(camera, size)
+    values = {"f": fy, "cx": cx - width / 2, "cy": cy - height / 2, "b1": fx - fy, "b2": 0.0, "k4": 0.0}
     # p1 is the coefficient of r^2 + 2 x^2 in Metashape.
-    values = {"f": lens.fy, "cx": lens.cx - size[0] / 2, "cy": lens.cy - size[1] / 2, "b1": lens.fx - lens.fy}
-    values |= {"k1": lens.k1, "k2": lens.k2, "k3": lens.k3, "p1": lens.p2, "p2": lens.p1}
-    return "frame", {"b2": 0.0, "k4": 0.0} | values
+    return "frame", values | terms | {"p1": terms["p2"], "p2": terms["p1"]}
 
 
 def _written_shots(project: Project, world: _World, which: list[int]) -> list[str]:

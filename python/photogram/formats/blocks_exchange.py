@@ -17,13 +17,14 @@ from photogram.formats.description import agreement
 from photogram.formats.format import FORMATS
 from photogram.formats.images import Y_DOWN, checked_rotation, lens_with, pixel_rows, sizes_of
 from photogram.formats.models import attitude_matrices, known_cameras, known_points
-from photogram.formats.project import Frame, Project, Size
+from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream
 from photogram.io.places import at_place, image_size, one_word, positive
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
+from photogram.network.frame import Frame
 from photogram.network.observations import Position
 from photogram.words import Phrase, option_sd, phrase
 
@@ -39,7 +40,8 @@ ORIENTATIONS = {
 }
 """Rows: the axes of a camera orientation in the axes of photogram: x right, y up, z back."""
 CENTER = 0.5  # Shift from the centre of the first pixel (0, 0) to coordinates from its corner
-_TERMS = ("K1", "K2", "K3", "P1", "P2")
+_TERMS = {"K1": "k1", "K2": "k2", "K3": "k3", "P1": "p2", "P2": "p1"}
+"""Terms of OpenCV: P1 is the coefficient of r^2 + 2 x^2 in x, which OpenCV calls p2."""
 _READINGS: Mapping[str, Callable[[Mapping[str, float]], Mapping[str, float]]] = {
     "P1 and P2 exchanged": lambda own: {"p1": own["p2"], "p2": own["p1"]},
     "K1, K2, K3 with the other sign": lambda own: {name: -own[name] for name in ("k1", "k2", "k3")},
@@ -132,8 +134,7 @@ def _camera(element: Element, size: Size, axes: Floats, pixel: float | None, nam
         offsets = {"cx": cx - size[0] / 2, "cy": cy - size[1] / 2, "w": float(size[0]), "h": float(size[1])}
         own = {term.lower(): value for term, value in terms.items()}
         return Camera("agisoft_frame", {"f": fy, "b1": f - fy, "b2": skew, **offsets, **own}, name=name)
-    # P1 is the coefficient of r^2 + 2 x^2 in x, which OpenCV calls p2.
-    own = {term: terms[theirs] for term, theirs in zip(("k1", "k2", "k3", "p2", "p1"), _TERMS, strict=True)}
+    own = {_TERMS[term]: value for term, value in terms.items()}
     return Camera("full_opencv", {"fx": f, "fy": fy, "cx": float(cx), "cy": float(cy), **own}, name=name)
 
 
@@ -336,7 +337,20 @@ def write(project: Project) -> Mapping[str, bytes]:
     gnss = {each.photos[0]: each.observed[:3] for each in block.observations.of_type(Position)}
     rotations = Y_DOWN @ attitude_matrices(block).transpose(0, 2, 1)
     for row, (camera, size) in enumerate(zip(cameras, sizes_of(project), strict=True)):
-        lines += ["<Photogroup>", *_written_camera(camera, size)]
+        lens, own = lens_with(camera, size, "BlocksExchange", *_TERMS.values())
+        (fx, fy), (cx, cy) = lens.focal, lens.centre
+        lines += [
+            "<Photogroup>",
+            f"<Name>{_text(camera.title)}</Name>",
+            f"<ImageDimensions><Width>{size[0]}</Width><Height>{size[1]}</Height></ImageDimensions>",
+            "<CameraModelType>Perspective</CameraModelType>",
+            f"<FocalLengthPixels>{fx!r}</FocalLengthPixels>",
+            "<CameraOrientation>XRightYDown</CameraOrientation>",
+            f"<PrincipalPoint>{_tags({'x': cx - CENTER, 'y': cy - CENTER})}</PrincipalPoint>",
+            f"<Distortion>{_tags({theirs: own[term] for theirs, term in _TERMS.items()})}</Distortion>",
+            f"<AspectRatio>{fy / fx!r}</AspectRatio>",
+            "<Skew>0.0</Skew>",
+        ]
         for photo in np.flatnonzero(np.asarray(which) == row).tolist():
             lines += _written_photo(project, photo, rotations[photo].tolist(), gnss)
         lines.append("</Photogroup>")
@@ -354,22 +368,6 @@ def _tags(values: Mapping[str, float]) -> str:
 
 def _xyz(position: Floats) -> str:
     return _tags(dict(zip("xyz", position.tolist(), strict=True)))
-
-
-def _written_camera(camera: Camera, size: Size) -> list[str]:
-    lens = lens_with(camera, size, "BlocksExchange", "k1", "k2", "k3", "p1", "p2")
-    terms = {"K1": lens.k1, "K2": lens.k2, "K3": lens.k3, "P1": lens.p2, "P2": lens.p1}
-    return [
-        f"<Name>{_text(camera.title)}</Name>",
-        f"<ImageDimensions><Width>{size[0]}</Width><Height>{size[1]}</Height></ImageDimensions>",
-        "<CameraModelType>Perspective</CameraModelType>",
-        f"<FocalLengthPixels>{lens.fx!r}</FocalLengthPixels>",
-        "<CameraOrientation>XRightYDown</CameraOrientation>",
-        f"<PrincipalPoint>{_tags({'x': lens.cx - CENTER, 'y': lens.cy - CENTER})}</PrincipalPoint>",
-        f"<Distortion>{_tags(terms)}</Distortion>",
-        f"<AspectRatio>{lens.fy / lens.fx!r}</AspectRatio>",
-        "<Skew>0.0</Skew>",
-    ]
 
 
 def _written_photo(

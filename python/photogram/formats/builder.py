@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -303,22 +302,28 @@ class BlockBuilder:
         self._add_gnss()
         images, repeated = self._image_fields()
         form = angles_form(fields.get("photo_to_ground", False))
-        with self._repeated_names(), at_place(self.place):
-            block = Block(
-                photo_ids=self.photo_ids,
-                photo_positions=centres,
-                photo_attitudes=known_angles(form, matrices),
-                photo_position_sd=np.asarray(self.position_sd),
-                photo_attitude_sd=np.asarray(self.attitude_sd),
-                cameras=self.cameras,
-                photo_cameras=np.asarray(self.photo_cameras),
-                point_ids=self.point_ids,
-                observations=self.observations,
-                mounts=self.mounts,
-                **points,
-                **images,
-                **fields,
-            )
+        try:
+            with at_place(self.place):
+                block = Block(
+                    photo_ids=self.photo_ids,
+                    photo_positions=centres,
+                    photo_attitudes=known_angles(form, matrices),
+                    photo_position_sd=np.asarray(self.position_sd),
+                    photo_attitude_sd=np.asarray(self.attitude_sd),
+                    cameras=self.cameras,
+                    photo_cameras=np.asarray(self.photo_cameras),
+                    point_ids=self.point_ids,
+                    observations=self.observations,
+                    mounts=self.mounts,
+                    **points,
+                    **images,
+                    **fields,
+                )
+        except InputError:
+            for kind, names in (("photo", self.photo_ids), ("point", self.point_ids)):
+                for twice in (name for name, count in Counter(names).items() if count > 1):
+                    raise self.place.error(phrase("error.repeated", kind=kind, name=twice)) from None
+            raise
         return Project(
             block=block,
             path=self.path,
@@ -462,18 +467,6 @@ class BlockBuilder:
                 # These arrays are complete and read-only: the block shares them.
                 each.flags.writeable = False
         return {"image_photos": photos, "image_points": points, "image_xy": xy, "image_sd": sd}, repeated
-
-    @contextmanager
-    def _repeated_names(self) -> Iterator[None]:
-        """Add the location to the error of a block on repeated names."""
-        try:
-            yield
-        except InputError:
-            for kind, names in (("photo", self.photo_ids), ("point", self.point_ids)):
-                if len(set(names)) < len(names):
-                    twice = next(name for name, count in Counter(names).items() if count > 1)
-                    raise self.place.error(phrase("error.repeated", kind=kind, name=twice)) from None
-            raise
 
 
 def _add(rows: dict[Hashable, int], key: Hashable, what: str, place: Failing) -> None:

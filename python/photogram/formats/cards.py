@@ -36,11 +36,7 @@ class Card:
     @property
     def ends(self) -> bool:
         """Whether the line is an end mark: -99, alone or with zeros."""
-        return (
-            bool(self.words)
-            and self.words[0] == END
-            and all(word.strip("0.") == "" for word in self.words[1:])
-        )
+        return self.words[:1] == [END] and not any(word.strip("0.") for word in self.words[1:])
 
 
 def filled_lines(path: Path) -> Iterator[Place]:

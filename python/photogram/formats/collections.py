@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Bools
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import FORMATS
@@ -143,7 +143,15 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
     rows = np.flatnonzero(oriented[block.image_photos] & placed[block.image_points])
     if not len(rows):
         raise InputError(phrase("format.no-images"))
-    xy = _moved(project, cameras, sizes, np.asarray(photo_cameras)[block.image_photos])
+    # Image coordinates from the centre, reduced to f, k1, k2
+    xy, directions = block.image_xy.copy(), image_directions(block)
+    for row, (camera, size) in enumerate(zip(cameras, sizes, strict=True)):
+        own = np.asarray(photo_cameras)[block.image_photos] == row
+        if _reduced(camera, size) is None:
+            with np.errstate(divide="ignore", invalid="ignore"):
+                xy[own] = -camera.scale * directions[own, :2] / directions[own, 2:]
+        elif camera.model == "radial" and size is not None:
+            xy[own] = np.column_stack([xy[own, 0] - size[0] / 2, size[1] / 2 - xy[own, 1]])
     rows = rows[np.isfinite(xy[rows]).all(axis=1)]
     photos, points = np.flatnonzero(oriented), np.flatnonzero(placed)
     of_photo, of_point = np.full(len(oriented), -1), np.full(len(placed), -1)
@@ -167,20 +175,3 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
         image_xy=xy[rows],
     )
     return found, [block.photo_ids[row] for row in photos]
-
-
-def _moved(
-    project: Project, cameras: list[Camera], sizes: Sequence[Size | None], of_images: Indices
-) -> Floats:
-    """Return (m, 2) image coordinates from the centre, reduced to f, k1, k2."""
-    block = project.block
-    found = block.image_xy.copy()
-    directions = image_directions(block)
-    for row, (camera, size) in enumerate(zip(cameras, sizes, strict=True)):
-        own = of_images == row
-        if _reduced(camera, size) is None:
-            with np.errstate(divide="ignore", invalid="ignore"):
-                found[own] = -camera.scale * directions[own, :2] / directions[own, 2:]
-        elif camera.model == "radial" and size is not None:
-            found[own] = np.column_stack([found[own, 0] - size[0] / 2, size[1] / 2 - found[own, 1]])
-    return found

@@ -307,7 +307,8 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
         column for column in read if column not in ("", "point") and isinstance(table.cells[column], list)
     ]
     for column in named or texts:
-        found = [_role(cell, columns) for cell in table.texts(column)]
+        cells = table.texts(column)
+        found = [columns.roles.get(cell.casefold()) or role_of(cell) if cell else "" for cell in cells]
         own, meaning = headings[column], column_of(headings[column])
         sure = column == ROLE and (ROLE in columns.headings or not _PLAIN_ROLES.isdisjoint(words_of(own)))
         if meaning in _FLAGS and not any(found):
@@ -327,12 +328,6 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
         roles = phrase("columns.roles-read", heading=headings[column], counts=counts)
         messages.append(Message(roles, table.path))
     return table.renamed({column: ROLE}).with_texts(ROLE, uses)
-
-
-def _role(cell: str, columns: Columns) -> str | None:
-    if not cell:
-        return ""
-    return columns.roles.get(cell.casefold()) or role_of(cell)
 
 
 def _flag(table: ColumnTable, column: str, row: int, meaning: str) -> str:

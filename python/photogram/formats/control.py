@@ -160,6 +160,7 @@ BETTER = 10.0  # Ratio of misfits that a correction must reach to be reported
 FITS = 0.2  # Misfit, relative to the extent of control, below which control agrees with initial values
 FAR = 100.0  # Distance of photos from control, in extents, that indicates different systems
 ZONE = 1e6
+_AXES, _SWAPPED = [0, 1, 2], [1, 0, 2]
 
 Exchange = tuple[Phrase, str, Callable[[Floats], Floats]]
 
@@ -206,7 +207,7 @@ def check_systems(
     if as_is <= (FITS * extent if firm else FAR * reach):
         if free and len(stations) and settings.crs.get("control", "") == "":
             below, above = (
-                _from_below(stations, model[seen], own[seen]) for own in (values, _swapped(values))
+                _from_below(stations, model[seen], values[seen][:, order]) for order in (_AXES, _SWAPPED)
             )
             if below and not above:
                 return [Message(phrase("control-system.below", option=_swap(table)), table.path)]
@@ -237,10 +238,6 @@ def _swap(table: ColumnTable) -> str:
     return f"--columns x={heading_of(table, 'y')},y={heading_of(table, 'x')}"
 
 
-def _swapped(xyz: Floats) -> Floats:
-    return xyz[:, [1, 0, 2]]
-
-
 def _from_below(stations: Floats, model: Floats, placed: Floats) -> bool:
     """Return whether control is above the transformed stations."""
     scale, turn, shift, misfit = similarity(model, placed)
@@ -251,7 +248,7 @@ def _from_below(stations: Floats, model: Floats, placed: Floats) -> bool:
 def _exchanges(table: ColumnTable, values: Floats, *, free: bool) -> Iterator[Exchange]:
     """Yield corrections of control with their remedies."""
     x, y, z = (heading_of(table, axis) for axis in "xyz")
-    yield phrase("control-system.swapped"), _swap(table), _swapped
+    yield phrase("control-system.swapped"), _swap(table), lambda xyz: xyz[:, _SWAPPED]
     feet = phrase("control-system.unit", name=z, unit="ft")
     yield feet, f"--columns z={z}[ft]", partial(np.multiply, (1.0, 1.0, 0.3048))
     if free:

@@ -17,9 +17,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.formats.project import Frame
 from photogram.messages import Message
 from photogram.network.block import Block
+from photogram.network.frame import Frame
 from photogram.network.geometry import local_frames
 from photogram.network.refraction import METRES_PER_UNIT
 from photogram.words import Phrase, phrase
@@ -91,9 +91,7 @@ def _geoid(crs: str) -> Floats:
 
 def has_geoid_heights(crs: str) -> bool:
     """Return whether heights refer to the geoid instead of the ellipsoid."""
-    if enu_origin(crs) is not None:
-        return False
-    return _GEOID.search(crs) is not None or bool(_system(crs).is_compound)
+    return enu_origin(crs) is None and bool(_GEOID.search(crs) or _system(crs).is_compound)
 
 
 def without_geoid(crs: str) -> str:
@@ -223,8 +221,8 @@ def is_on(crs: str, ellipsoid: tuple[float, float]) -> bool:
     """Return whether a system is geographic on this ellipsoid (semi-axes, m)."""
     if enu_origin(crs) is not None or not _system(crs).is_geographic:
         return False
-    own = _system(crs).ellipsoid
-    axes = (own.semi_major_metre, own.semi_minor_metre) if own is not None else (0.0, 0.0)
+    own: Any = _system(crs).ellipsoid  # Geographic systems have one
+    axes = own.semi_major_metre, own.semi_minor_metre
     return bool(np.allclose(axes, ellipsoid, rtol=0, atol=0.01))  # Semi-axes in cards have two decimals
 
 
@@ -263,10 +261,7 @@ def _on_earth(xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
 
 def is_projected(crs: str) -> bool:
     """Return whether a system has eastings and northings of a projection."""
-    if enu_origin(crs) is not None:
-        return False
-    system = _system(crs)
-    return bool(system.is_projected or (system.is_compound and system.sub_crs_list[0].is_projected))
+    return axes_of(crs)[0][0] == "easting"
 
 
 def axes_of(crs: str) -> tuple[tuple[str, str, str], tuple[str, str, str]]:
@@ -276,7 +271,7 @@ def axes_of(crs: str) -> tuple[tuple[str, str, str], tuple[str, str, str]]:
     system = _system(crs)
     if system.is_geocentric:
         return ("x", "y", "z"), ("m", "m", "m")
-    if is_projected(crs):
+    if system.is_projected or (system.is_compound and system.sub_crs_list[0].is_projected):
         return ("easting", "northing", "height"), ("m", "m", "m")
     return ("longitude", "latitude", "height"), ("deg", "deg", "m")
 
@@ -298,10 +293,9 @@ def _axes(crs: str, xyz: Floats, earth: Floats) -> Floats:
         local = np.einsum("nij,nj->ni", found, north)
         angle = np.arctan2(local[:, 0], local[:, 1])
         zero, one = np.zeros_like(angle), np.ones_like(angle)
-        turn = np.array(
-            [[np.cos(angle), -np.sin(angle), zero], [np.sin(angle), np.cos(angle), zero], [zero, zero, one]]
-        ).transpose(2, 0, 1)
-        found = turn @ found
+        sine, cosine = np.sin(angle), np.cos(angle)
+        turn = np.array([[cosine, -sine, zero], [sine, cosine, zero], [zero, zero, one]])
+        found = turn.transpose(2, 0, 1) @ found
     return found
 
 

@@ -16,13 +16,11 @@ from photogram.formats.plain.trajectories import shared_trajectories
 from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message, listed
-from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
 from photogram.network.film_reduction import camera_images, camera_unit
 from photogram.network.motion import given_poses, on_shared, timed_images
-from photogram.network.moving_photos import Timed
 from photogram.network.observations import Control
-from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
+from photogram.network.trajectories import Basis, Coefficient, Polynomial
 from photogram.results.datum import point_kinds
 from photogram.show.judgement import remarks_section
 from photogram.show.page import Document, Fact, Facts, Remarks, Section, Text, significant
@@ -37,6 +35,15 @@ def described(project: Project) -> Document:
     """Return the document of a project: sizes, cameras, trajectories, units, missing data."""
     remarks = [*project.messages, *doubts(project)]
     size, members = _size(project)
+    block, found = project.block, agreement(project)
+    down = {each.image_y for each in known_cameras(block)[0]} == {"down"}
+    corner = "pixels from the upper-left corner" if down else ""
+    conventions = [Fact("Frame", str(project.frame)), Fact("Unit", block.linear_unit)]
+    conventions.append(Fact("Image coordinates", block.image_unit, note=corner))
+    if found.images:
+        note = f"{found.images} images with the positions of the file"
+        residual = Fact.of("Median residual", found.median, camera_unit(block), figures=3, note=note)
+        conventions.append(residual)
     return Document(
         "Project",
         project.title,
@@ -45,7 +52,7 @@ def described(project: Project) -> Document:
             Section("given-size", "Size", [size]),
             Section("given-cameras", "Cameras", [_cameras(project)]),
             Section("given-trajectories", "Trajectories", _trajectories(project)),
-            Section("conventions", "Units and axes", [_conventions(project)]),
+            Section("conventions", "Units and axes", [Facts("", conventions)]),
             Section("lacking", "Lacking", [Remarks([*map(str, project.lacks)])]),
             remarks_section(remarks),
         ],
@@ -68,7 +75,11 @@ def _size(project: Project) -> tuple[Facts, dict[str, Any]]:
     rays = np.bincount(block.image_points, minlength=len(block.point_ids))
     counts = np.bincount(np.minimum(rays[rays > 0], MOST_RAYS), minlength=MOST_RAYS + 1).tolist()
     of_rays = {f"{k}{' or more' * (k == MOST_RAYS)}": count for k, count in enumerate(counts) if count}
-    kinds, (control, checks, idle) = Counter(each.label for each in block.observations), _control(block, rays)
+    kinds, of_points = Counter(each.label for each in block.observations), point_kinds(block)
+    others = {name for each in block.observations if not isinstance(each, Control) for name in each.points}
+    measured = (rays > 0) | np.isin(block.point_ids, list(others))
+    control, checks = (int(np.count_nonzero(measured & (of_points == kind))) for kind in ("control", "check"))
+    idle = [block.point_ids[row] for row in np.flatnonzero(~measured & (of_points != "pass"))]
     members: dict[str, Any] = {
         "photos": len(block.photo_ids),
         "photos_with_position": int(np.count_nonzero(np.isfinite(block.photo_positions).all(axis=1))),
@@ -96,15 +107,6 @@ def _size(project: Project) -> tuple[Facts, dict[str, Any]]:
     if block.mounts:
         facts.append(Fact.of("Photos on frames with others", len(block.mounts)))
     return Facts("", facts), members
-
-
-def _control(block: Block, rays: Indices) -> tuple[int, int, list[str]]:
-    """Return numbers of control and check points, and names of unobserved ones."""
-    others = {name for each in block.observations if not isinstance(each, Control) for name in each.points}
-    measured = (rays > 0) | np.isin(block.point_ids, list(others))
-    kinds = point_kinds(block)
-    control, checks = (int(np.count_nonzero(measured & (kinds == kind))) for kind in ("control", "check"))
-    return control, checks, [block.point_ids[row] for row in np.flatnonzero(~measured & (kinds != "pass"))]
 
 
 def _cameras(project: Project) -> Table:
@@ -174,26 +176,11 @@ def _trajectories(project: Project) -> list[Facts | Table]:
 
 
 def _basis(basis: Basis | None, coefficients: tuple[Coefficient, ...]) -> str:
-    """Describe the corrections of a trajectory."""
     if basis is None:
         return "as given"
     kind = "polynomial" if isinstance(basis, Polynomial) else "spline"
     known = ", fixed" if all(each.is_held for each in coefficients) else ""
     return f"{kind} of degree {basis.degree}, {len(coefficients)} coefficients{known}"
-
-
-def _conventions(project: Project) -> Facts:
-    block, found = project.block, agreement(project)
-    down = {each.image_y for each in known_cameras(block)[0]} == {"down"}
-    facts = [
-        Fact("Frame", str(project.frame)),
-        Fact("Unit", block.linear_unit),
-        Fact("Image coordinates", block.image_unit, note="pixels from the upper-left corner" if down else ""),
-    ]
-    if found.images:
-        note = f"{found.images} images with the positions of the file"
-        facts.append(Fact.of("Median residual", found.median, camera_unit(block), figures=3, note=note))
-    return Facts("", facts)
 
 
 MOST = 20_000  # Largest number of observations used
@@ -226,6 +213,13 @@ class _Sample:
         lengths = np.linalg.norm(images - self.xy, axis=1)
         return np.asarray(np.where(np.isfinite(lengths) & (directions[:, 2] < 0), lengths, np.inf))
 
+    def mirrored(self, axis: int) -> _Sample:
+        """Return the sample with image coordinates reversed about the principal point."""
+        xy, axes = self.xy.copy(), np.tile([0.0, 0.0, -1.0], (len(self.xy), 1))
+        middle = images_of(self.cameras, self.which, axes)
+        xy[:, axis] = 2 * middle[:, axis] - xy[:, axis]
+        return replace(self, xy=xy)
+
     def median(self) -> float:
         return float(np.median(self.residuals())) if len(self.xy) else np.nan
 
@@ -249,8 +243,16 @@ def _sample(project: Project) -> _Sample:
     places, axes, xy = block.photo_positions[photos], matrices[photos], camera_images(block)[rows]
     for own, trajectory, _, images in timed_images(block):
         of_photo = sampled[images][sampled[images] >= 0]
-        if len(of_photo):
-            places[of_photo], axes[of_photo], xy[of_photo] = _moving(own, trajectory, xy[of_photo])
+        if not len(of_photo):
+            continue
+        time, since, xy[of_photo] = own.images(xy[of_photo])
+        scale = 1.0 if own.readout is None else float(own.readout.position[0])
+        offset = 0.0 if own.offset is None else float(own.offset.position[0])
+        flown, turned = given_poses(trajectory, np.clip(time + offset + scale * since, *trajectory.reach))
+        places[of_photo], axes[of_photo] = flown, turned
+        if own.sensor is not None:
+            places[of_photo] += turned @ own.sensor.position
+            axes[of_photo] = turned @ own.sensor.attitude
     return _Sample(
         cameras,
         np.asarray(photo_cameras, dtype=np.int64)[photos],
@@ -258,17 +260,6 @@ def _sample(project: Project) -> _Sample:
         axes.transpose(0, 2, 1),
         xy,
     )
-
-
-def _moving(own: Timed, trajectory: Trajectory, xy: Floats) -> tuple[Floats, Floats, Floats]:
-    """Return poses of a photo at image times, and focal coordinates."""
-    time, since, there = own.images(xy)
-    scale = 1.0 if own.readout is None else float(own.readout.position[0])
-    offset = 0.0 if own.offset is None else float(own.offset.position[0])
-    places, axes = given_poses(trajectory, np.clip(time + offset + scale * since, *trajectory.reach))
-    if own.sensor is not None:
-        places, axes = places + axes @ own.sensor.position, axes @ own.sensor.attitude
-    return places, axes, there
 
 
 def agreement(project: Project) -> Agreement:
@@ -305,21 +296,9 @@ def doubts(project: Project) -> list[Message]:
     return messages
 
 
-def _mirrored(axis: int) -> Callable[[_Sample], _Sample]:
-    """Return a change: image coordinates reversed about the principal point."""
-
-    def change(sample: _Sample) -> _Sample:
-        middle = images_of(sample.cameras, sample.which, np.tile([0.0, 0.0, -1.0], (len(sample.xy), 1)))
-        xy = sample.xy.copy()
-        xy[:, axis] = 2 * middle[:, axis] - xy[:, axis]
-        return replace(sample, xy=xy)
-
-    return change
-
-
 _OTHERS: dict[str, Callable[[_Sample], _Sample]] = {
-    "y (rows) in the opposite direction": _mirrored(1),
-    "x (columns) in the opposite direction": _mirrored(0),
+    "y (rows) in the opposite direction": lambda sample: sample.mirrored(1),
+    "x (columns) in the opposite direction": lambda sample: sample.mirrored(0),
     "transposed rotations": lambda sample: replace(sample, matrices=sample.matrices.transpose(0, 2, 1)),
     "photos in the opposite direction": lambda sample: replace(sample, matrices=Y_DOWN @ sample.matrices),
 }

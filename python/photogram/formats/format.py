@@ -21,8 +21,6 @@ if TYPE_CHECKING:
     from photogram.results.result import Result
     from photogram.words import Phrase
 
-__all__ = ["FORMATS", "FORMATS_OF_CAMERAS", "Format", "later"]
-
 
 def later(home: str) -> Callable[..., Any]:
     """Return the function `MODULE:NAME`, whose module of this package is imported at the first call.

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-import numpy as np
-
 from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError, message_of
 from photogram.formats.format import FORMATS
-from photogram.formats.project import Frame, Project
+from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.giant.files import to_bytes
 from photogram.messages import Message
+from photogram.network.frame import Frame
 from photogram.words import Phrase, phrase
 
 
@@ -29,14 +28,10 @@ def read(path: Path, options: ReadOptions) -> Project:
     messages = list(found.messages)
     if found.common.intersection_only:
         messages.append(Message(phrase("format.intersection"), path))
-    count = len(block.cameras)
     return Project(
         block=block,
         path=path,
         title=FORMATS["giant"].title,
-        sizes=(None,) * count,
-        pixel_mm=(None,) * count,
-        starts=np.array(block.point_positions),
         frame=Frame("geographic", ellipsoid=(block.spheroid.a, block.spheroid.b))
         if block.spheroid
         else Frame(),

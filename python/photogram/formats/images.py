@@ -15,8 +15,8 @@ from photogram.formats.plain.settings import Settings
 from photogram.formats.project import Project, Size
 from photogram.io.numbers import scaled
 from photogram.io.places import Failing
-from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
+from photogram.network.opencv_lens import OpencvLens, opencv_lens
 from photogram.words import phrase
 
 
@@ -27,7 +27,7 @@ def by_camera(xy: Floats, which: Indices, convert: Callable[[int, Floats], Float
     changed.
     """
     found = xy.copy()
-    for row in np.unique(which[which >= 0]).tolist():
+    for row in np.flatnonzero(np.bincount(which[which >= 0])).tolist():
         own = which == row
         found[own] = convert(row, xy[own])
     return found
@@ -147,84 +147,49 @@ def scaled_camera(camera: Camera, factors: Mapping[str, float]) -> Camera:
     )
 
 
-_TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6")
-_MIDDLE = frozenset({"bal", "perspective", "brown", "brown_forward"})
-"""Models that count from the image centre, y up."""
-_FAMILY = _MIDDLE | {
-    *("radial", "simple_radial", "simple_pinhole", "pinhole"),
-    *("opencv", "full_opencv", "opencv_pinhole", "agisoft_frame"),
-}
-
-
-@dataclass(frozen=True)
-class Lens:
-    """A camera in pixels with an OpenCV lens, y down (p1 of r^2 + 2 y^2 in y)."""
-
-    fx: float  # Principal distances
-    fy: float
-    cx: float  # Principal point from the upper-left corner
-    cy: float
-    k1: float = 0.0  # Terms; k4 .. k6 are of the denominator
-    k2: float = 0.0
-    k3: float = 0.0
-    k4: float = 0.0
-    k5: float = 0.0
-    k6: float = 0.0
-    p1: float = 0.0
-    p2: float = 0.0
-
-    @property
-    def terms(self) -> tuple[float, ...]:
-        """k1, k2, p1, p2, k3, k4, k5, k6."""
-        return tuple(getattr(self, name) for name in _TERMS)
-
-    def is_plain(self, *names: str) -> bool:
-        """Return whether all other terms than the named ones are 0."""
-        return not any(getattr(self, name) for name in _TERMS if name not in names)
-
-
-def lens_of(camera: Camera, size: Size | None) -> Lens | None:
-    """Return an exactly equivalent camera of the family; None without.
+def lens_of(camera: Camera, size: Size | None) -> OpencvLens | None:
+    """Return an exactly equivalent lens in pixels; None without.
 
     A camera that counts from the image centre needs its size.
     """
-    values = camera.parameters
-    if camera.unit != "px" or camera.model not in _FAMILY:
-        return None
-    if camera.model == "opencv_pinhole" and any(values[name] for name in ("s1", "s2", "s3", "s4")):
-        return None
-    terms = {name: values[name] for name in _TERMS if name in values}
-    if camera.model == "agisoft_frame":
-        if values["b2"] or values["k4"]:
-            return None
-        terms |= {"p1": values["p2"], "p2": values["p1"]}
-        fx, middle = values["f"] + values["b1"], (values["w"] / 2, values["h"] / 2)
-        return Lens(fx, values["f"], middle[0] + values["cx"], middle[1] + values["cy"], **terms)
-    if camera.model in _MIDDLE:
-        return None if size is None else _about_middle(camera, size, terms)
-    if "k" in values:
-        terms = {"k1": values["k"]}
-    fx, fy = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
-    return Lens(fx, fy, values["cx"], values["cy"], **terms)
-
-
-def lens_with(camera: Camera, size: Size | None, title: str, *terms: str) -> Lens:
-    """Return an exactly equivalent lens with some terms for the format of a title; reject other cameras."""
-    lens = lens_of(camera, size)
-    if lens is None or not lens.is_plain(*terms):
-        raise InputError(phrase("format.model", camera=camera.title, model=camera.model, title=title))
-    return lens
-
-
-def _about_middle(camera: Camera, size: Size, terms: Mapping[str, float]) -> Lens | None:
-    values = camera.parameters
+    values, pixels = camera.parameters, camera.unit == "px"
+    if camera.model == "agisoft_frame" and pixels and not (values["b2"] or values["k4"]):
+        terms = {"k1": values["k1"], "k2": values["k2"], "p1": values["p2"], "p2": values["p1"]}
+        centre = values["w"] / 2 + values["cx"], values["h"] / 2 + values["cy"]
+        focal = values["f"] + values["b1"], values["f"]
+        return OpencvLens(False, focal, centre, terms | {"k3": values["k3"]})
+    if camera.model not in _FROM_CENTRE:
+        return opencv_lens(camera) if pixels else None
     f = values["f"] if camera.model == "bal" else -values["c"]
-    lost = {"brown": ("K1", "K2", "K3", "P1", "P2", "b1", "b2"), "brown_forward": ("C1", "C2", "r0")}
-    if f < 0 or any(values[name] for name in lost.get(camera.model, ())):
+    if size is None or not pixels or f < 0 or any(values[name] for name in _FROM_CENTRE[camera.model]):
         return None
+    terms = {name: values[name] for name in ("k1", "k2") if name in values}
     if camera.model == "brown_forward":
         # If y is down, B2 has the other sign.
         terms = {"p1": -values["B2"] * f, "p2": values["B1"] * f}
         terms |= {f"k{n}": values[f"A{n}"] * f ** (2 * n) for n in (1, 2, 3)}
-    middle = size[0] / 2 + values.get("xp", 0.0), size[1] / 2 - values.get("yp", 0.0)
-    return Lens(f, f, *middle, **terms)
+    centre = size[0] / 2 + values.get("xp", 0.0), size[1] / 2 - values.get("yp", 0.0)
+    return OpencvLens(False, (f, f), centre, terms)
+
+
+def lens_with(
+    camera: Camera, size: Size | None, title: str, *terms: str, fisheye: Sequence[str] = ()
+) -> tuple[OpencvLens, dict[str, float]]:
+    """Return an exactly equivalent lens, and its terms of the format of a title; reject other cameras.
+
+    `terms` are the terms of pinholes, `fisheye` those of fisheyes; empty: the format has no fisheyes.
+    """
+    if (lens := lens_of(camera, size)) is not None and (fisheye or not lens.fisheye):
+        found = lens.named(*(fisheye if lens.fisheye else terms))
+        if found is not None:
+            return lens, found
+    raise InputError(phrase("format.model", camera=camera.title, model=camera.model, title=title))
+
+
+_FROM_CENTRE: Mapping[str, Sequence[str]] = {
+    "bal": (),
+    "perspective": (),
+    "brown": ("K1", "K2", "K3", "P1", "P2", "b1", "b2"),
+    "brown_forward": ("C1", "C2", "r0"),
+}
+"""Models that count from the image centre, y up, and their parameters without equivalents."""

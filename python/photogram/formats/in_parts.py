@@ -100,7 +100,11 @@ class Streamed:
         shutil.rmtree(self._folder, ignore_errors=True)
         self._folder.mkdir(parents=True)
         self._tables = tables = Tables(settings, [])
-        tied = _tied_names(tables)
+        tied = set[str](settings.statement.get("without", ()))
+        for name, schema in TABLES.items():
+            parts = (column for column in schema.all_columns if column.kind == "point")
+            for column in (each for part in parts for each in part.names):
+                tied.update(tables.rows(name).texts(column))
         control = set(tables.rows("control").texts("point"))
 
         def are_tied(table: ColumnTable) -> Bools:
@@ -294,16 +298,6 @@ class Streamed:
             image_sd=found["sd"],
             observations=observations,
         )
-
-
-def _tied_names(tables: Tables) -> set[str]:
-    """Return the names of points in tables of observations and in the settings."""
-    found = set[str](tables.settings.statement.get("without", ()))
-    for name, schema in TABLES.items():
-        columns = [each for column in schema.all_columns if column.kind == "point" for each in column.names]
-        for column in columns:
-            found.update(tables.rows(name).texts(column))
-    return found
 
 
 def _selected(parts: Iterable[ColumnTable], wanted: Callable[[ColumnTable], Bools]) -> ColumnTable | None:

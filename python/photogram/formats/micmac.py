@@ -85,8 +85,7 @@ def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
     scans, files = _of_images(folder)
     if not files:
         raise InputError(phrase("format.files", name="MeasuresIm-*.xml"), file=scans)
-    beside = [path for path in (scans / CAMERA, folder / CAMERA, scans.parent / CAMERA) if path.is_file()]
-    path = camera or next(iter(beside), scans / CAMERA)
+    path = camera or _beside(scans, folder, CAMERA) or scans / CAMERA
     places = _measures(path)
     if len(places) != 1:
         raise InputError(phrase("micmac.images", n=len(places)), file=path)
@@ -111,6 +110,11 @@ def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
     return MicmacMarks(amid, readings, turned, (remark, *remarks))
 
 
+def _beside(scans: Path, folder: Path, name: str) -> Path | None:
+    files = (each / name for each in (scans, folder, scans.parent))
+    return next((each for each in files if each.is_file()), None)
+
+
 def _named(
     scans: Path,
     folder: Path,
@@ -122,10 +126,7 @@ def _named(
     read = {mark for own in readings.values() for mark in own}
     missing = [mark for mark in places if mark not in read]
     remarks = [phrase("micmac.unread", names=missing, n=len(missing))] if missing else []
-    path = next(
-        (each for each in (scans / NAMES, folder / NAMES, scans.parent / NAMES) if each.is_file()), None
-    )
-    if path is None:
+    if (path := _beside(scans, folder, NAMES)) is None:
         return remarks
     given: set[str] = set()
     for record, line in enumerate(read_lines(path), 1):

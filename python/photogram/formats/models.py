@@ -11,7 +11,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.images import scaled_camera
-from photogram.formats.project import Frame, Project, Size
+from photogram.formats.project import Project, Size
 from photogram.io.places import Failing
 from photogram.messages import Message
 from photogram.network.attitudes import angles_form, known_angles, known_matrices
@@ -20,6 +20,7 @@ from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
 from photogram.network.films import Scan
+from photogram.network.frame import Frame
 from photogram.network.geometry import (
     Cartesian,
     Spheroid,
@@ -169,18 +170,10 @@ def _held(project: Project) -> int:
     return int(np.count_nonzero(np.isfinite(project.block.point_sd).any(axis=1)))
 
 
-def _always(project: Project) -> bool:
-    del project
-    return True
-
-
 _ABSENT: Mapping[str, Count] = {
-    "names": _always,
-    "deviations": _always,
-    "points": _always,
-    "frame": _always,
+    **dict.fromkeys(("names", "deviations", "points", "frame"), lambda _: True),
     "lenses": lambda project: any(each.model != "perspective" for each in known_cameras(project.block)[0]),
-    "shared-cameras": _always,
+    "shared-cameras": lambda _: True,
     "unknowns": lambda project: any(each.deviations.any() for each in known_cameras(project.block)[0]),
     "control": lambda project: _held(project) + len(project.checks),
     "rigs": lambda project: len(project.block.mounts),
@@ -232,7 +225,7 @@ def in_pixels(project: Project) -> Project:
     none = (None,) * len(cameras)
     pixels = [each or (None if given else NOMINAL_MM) for each in project.pixel_mm or none]
     xy, sd = block.image_xy.copy(), block.image_sd.copy()
-    made, sizes = [], []
+    made, sizes = list[Camera](), list[Size | None]()
     for row, (camera, pixel, size) in enumerate(zip(cameras, pixels, project.sizes or none, strict=True)):
         own = of_images == row
         scale = 1.0 if given or pixel is None else 1.0 / pixel
@@ -242,7 +235,11 @@ def in_pixels(project: Project) -> Project:
         sign = -1.0 if negative else 1.0
         factors = {name: sign * scale**power for name, power in camera.powers.items()}
         made.append(scaled_camera(camera, factors).replace(unit="px"))
-        sizes.append(_size(camera, xy[own]) if size is None and _is_free(camera) else size)
+        if size is None and _is_free(camera):
+            # A size that contains all observations.
+            reach = np.abs(xy[own]).max(axis=0, initial=1.0) * (2 if camera.image_y == "up" else 1)
+            size = (ROUND * math.ceil(reach[0] / ROUND), ROUND * math.ceil(reach[1] / ROUND))
+        sizes.append(size)
     return project.replace(
         block=block.replace(
             cameras=made,
@@ -274,13 +271,6 @@ def _unsized(project: Project) -> bool:
 def _is_free(camera: Camera) -> bool:
     """Return whether coordinates do not depend on the image size."""
     return camera.image_y == "up" or camera.unit == "mm"
-
-
-def _size(camera: Camera, xy: Floats) -> Size:
-    """Return an image size that contains all observations."""
-    reach = np.abs(xy).max(axis=0, initial=1.0) * (2 if camera.image_y == "up" else 1)
-    width, height = (ROUND * math.ceil(each / ROUND) for each in reach.tolist())
-    return width, height
 
 
 def in_topocentric(project: Project) -> Project:

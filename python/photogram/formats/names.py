@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import UserDict
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -71,9 +72,17 @@ def with_other_names(project: Project, new: Mapping[str, str]) -> Project:
     )
 
 
-def renamed(project: Project, path: Path) -> Project:
-    """Return a project with the point names of a table, if the file exists."""
-    return with_names(project, path) if path.is_file() else project
+def read_names(path: Path) -> dict[str, str]:
+    """Return names by number from a table `number`, `name`; empty without file."""
+    if not path.is_file():
+        return {}
+    table = read_columns(path, known=("number", "name"))
+    table.require("number", "name")
+    names = dict(zip(table.names_once("number"), table.texts("name"), strict=True))
+    for row, (number, name) in enumerate(names.items()):
+        if not name:
+            raise table.error(row, phrase("format.name", what="number", name=number))
+    return names
 
 
 def numbered(names: Sequence[str], known: Mapping[str, str | int] | None = None) -> dict[str, int]:
@@ -88,28 +97,20 @@ def numbered(names: Sequence[str], known: Mapping[str, str | int] | None = None)
     return {name: number for number, name in enumerate(names, 1)}
 
 
-def names_file(numbers: Mapping[str, int]) -> dict[str, bytes]:
-    """Return the table of names, unless all names are their numbers."""
+def names_file(numbers: Mapping[str, int], heading: str = "point") -> dict[str, bytes]:
+    """Return the table of names by number, unless all names are their numbers."""
     if all(str(number) == name for name, number in numbers.items()):
         return {}
-    return {NAMES: csv_text({"point": list(numbers.values()), "name": list(numbers)})}
+    return {NAMES: csv_text({heading: list(numbers.values()), "name": list(numbers)})}
 
 
-class NamedValues(Mapping[str, T]):
+class NamedValues(UserDict[str, T]):
     """Values by name, in a dictionary that is created on demand."""
 
     def __init__(self, names: Sequence[str], values: Indices | Sequence[T]) -> None:
         self._names, self._values = names, values
 
     @cached_property
-    def _found(self) -> dict[str, T]:
+    def data(self) -> dict[str, T]:  # type: ignore[override]
+        """The dictionary."""
         return dict(zip(self._names, np.asarray(self._values).tolist(), strict=True))
-
-    def __getitem__(self, name: str) -> T:
-        return self._found[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._names)
-
-    def __len__(self) -> int:
-        return len(self._names)

@@ -21,18 +21,19 @@ from photogram.formats.models import (
     known_cameras,
     known_points,
 )
-from photogram.formats.project import Frame, Project, Size
+from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.recognition import opensfm
 from photogram.io.files import read_lines
 from photogram.io.json import read_json, to_json
 from photogram.io.numbers import finite_number
 from photogram.io.places import Place, at_place, one_word, positive
-from photogram.io.tree import Tree, unknown
+from photogram.io.tree import Tree
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
+from photogram.network.frame import Frame
 from photogram.network.observations import Observations, Position
 from photogram.words import Phrase, phrase
 
@@ -105,7 +106,7 @@ _PROJECTIONS = {
     "fisheye": ("radial_fisheye", "k1 k2"),
     "simple_radial": ("opencv", "k1"),
     "radial": ("opencv", "k1 k2"),
-    "brown": ("full_opencv", "k1 k2 k3 p1 p2"),
+    "brown": ("full_opencv", "k1 k2 p1 p2 k3"),
     "fisheye_opencv": ("opencv_fisheye", "k1 k2 k3 k4"),
     **dict.fromkeys(("spherical", "equirectangular"), ("equirectangular", "")),
 }
@@ -113,10 +114,8 @@ _PROJECTIONS = {
 
 
 def _camera(name: str, each: Tree, width: int, height: int) -> Camera:
-    kind = each.get("projection_type", "perspective")
-    if not isinstance(kind.value, str) or kind.value not in _PROJECTIONS:
-        raise unknown(kind, "projection type", _PROJECTIONS)
-    model, terms = _PROJECTIONS[kind.value]
+    kind = each.get("projection_type", "perspective").known("projection type", _PROJECTIONS)
+    model, terms = _PROJECTIONS[kind]
     if model == "equirectangular":
         if width != 2 * height:
             raise each.error(phrase("opensfm.spherical", width=width, height=height))
@@ -284,23 +283,15 @@ def _camera_member(camera: Camera, size: Size) -> dict[str, Any]:
     found: dict[str, Any] = {"width": width, "height": height}
     if camera.model == "equirectangular":
         return {**found, "projection_type": "spherical"}
-    if camera.model in ("opencv_fisheye", "radial_fisheye", "simple_radial_fisheye") and camera.unit == "px":
-        kind, values = "fisheye_opencv", camera.parameters
-        fx, fy = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
-        cx, cy = values["cx"], values["cy"]
-        terms = {name: values.get(name, 0.0) for name in ("k1", "k2", "k3", "k4")}
-        terms["k1"] = values.get("k", terms["k1"])
-    else:
-        kind, lens = "brown", lens_with(camera, size, "OpenSfM", "k1", "k2", "k3", "p1", "p2")
-        fx, fy, cx, cy = lens.fx, lens.fy, lens.cx, lens.cy
-        terms = {name: getattr(lens, name) for name in ("k1", "k2", "p1", "p2", "k3")}
+    brown, fisheye = (_PROJECTIONS[kind][1].split() for kind in ("brown", "fisheye_opencv"))
+    lens, terms = lens_with(camera, size, "OpenSfM", *brown, fisheye=fisheye)
     return {
         **found,
-        "projection_type": kind,
-        "focal_x": fx / scale,
-        "focal_y": fy / scale,
-        "c_x": (cx - width / 2) / scale,
-        "c_y": (cy - height / 2) / scale,
+        "projection_type": "fisheye_opencv" if lens.fisheye else "brown",
+        "focal_x": lens.focal[0] / scale,
+        "focal_y": lens.focal[1] / scale,
+        "c_x": (lens.centre[0] - width / 2) / scale,
+        "c_y": (lens.centre[1] - height / 2) / scale,
         **terms,
     }
 

@@ -14,13 +14,11 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.network.frame import Frame
+from photogram.network.frame import Frame as Frame
 from photogram.results.features import Definition
 from photogram.summaries import Brief
 from photogram.targets.board import Board
 from photogram.words import Phrase, phrase
-
-__all__ = ["Frame", "Project", "Size", "Unused"]
 
 Size = tuple[int, int]  # Image width and height of a camera, pixels
 
@@ -63,11 +61,11 @@ class Project(Brief):
     title
         The format, for users.
     sizes
-        Image width and height of each camera of the block, pixels; None if unknown.
+        Image width and height of each camera of the block, pixels; None if unknown (default).
     pixel_mm
-        The side of a pixel of each camera in millimetres; None if unknown.
+        The side of a pixel of each camera in millimetres; None if unknown (default).
     starts
-        (n, 3) positions of the points of the block in the file; NaN without.
+        (n, 3) positions of the points of the block in the file; NaN without. None: those of the block.
     frame
         Reference frame of the coordinates; also in the block, and in its results.
     options
@@ -100,9 +98,9 @@ class Project(Brief):
     block: Block
     path: Path
     title: str
-    sizes: tuple[Size | None, ...]
-    pixel_mm: tuple[float | None, ...]
-    starts: Floats
+    sizes: tuple[Size | None, ...] = ()
+    pixel_mm: tuple[float | None, ...] = ()
+    starts: Floats = None  # type: ignore[assignment]  # Positions of the block if missing
     frame: Frame = field(default_factory=Frame)
     options: AdjustOptions = field(default_factory=AdjustOptions)
     lacks: tuple[Phrase, ...] = ()
@@ -118,7 +116,11 @@ class Project(Brief):
     control_crs: str = ""
 
     def __post_init__(self) -> None:
-        given = self.block.in_frame(self.frame)
+        given, unknown = self.block.in_frame(self.frame), (None,) * len(self.block.cameras)
+        object.__setattr__(self, "sizes", self.sizes or unknown)
+        object.__setattr__(self, "pixel_mm", self.pixel_mm or unknown)
+        if self.starts is None:
+            object.__setattr__(self, "starts", np.array(given.point_positions))
         object.__setattr__(self, "frame", frame_of(given))
         if (self.frame.kind == "geographic") != given.geographic:
             space = "geographic" if given.geographic else "rectangular: it has no spheroid"

@@ -13,8 +13,6 @@ from photogram.lazy_dataclasses import dataclass
 if TYPE_CHECKING:
     from photogram.formats.columns import Columns
 
-__all__ = ["ReadOptions"]
-
 REQUIRED = {
     "photos_crs": ("photos_dir",),
     "mrk_antenna": ("photos_dir", "gnss"),

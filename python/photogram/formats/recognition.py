@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from functools import partial
 from pathlib import Path
 
 from photogram.errors import InputError
@@ -27,11 +26,9 @@ def plain(path: Path) -> bool:
 def colmap(path: Path) -> Path | None:
     """Return the folder of a model: a path itself, or `sparse/0` or `sparse` in it."""
     for folder in (path, path / "sparse" / "0", path / "sparse"):
-        if any(
-            (folder / f"cameras{end}").is_file() and (folder / f"images{end}").is_file()
-            for end in (".bin", ".txt")
-        ):
-            return folder
+        for end in (".bin", ".txt"):
+            if (folder / f"cameras{end}").is_file() and (folder / f"images{end}").is_file():
+                return folder
     return None
 
 
@@ -89,9 +86,6 @@ def pixels(path: Path) -> bool:
 def has_suffix(suffix: str, path: Path) -> bool:
     """Return whether a file, or a file in a folder, has a suffix in any case."""
     return any(each.suffix.lower() == suffix for each in (path.iterdir() if path.is_dir() else (path,)))
-
-
-patb, aicon = partial(has_suffix, ".im"), partial(has_suffix, ".phc")
 
 
 def bingo(path: Path) -> bool:

@@ -19,7 +19,7 @@ from photogram.formats.description import agreement
 from photogram.formats.format import FORMATS
 from photogram.formats.images import checked_rotation
 from photogram.formats.models import attitude_matrices, complete_positions, known_cameras, known_points
-from photogram.formats.names import numbered
+from photogram.formats.names import NAMES, names_file, numbered, read_names
 from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Tables
@@ -27,7 +27,6 @@ from photogram.formats.plain.writing import control_table
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.io.csv_text import csv_text
-from photogram.io.delimited import read_columns
 from photogram.io.numbers import scaled
 from photogram.io.places import Place, one_word
 from photogram.lazy_dataclasses import dataclass
@@ -216,7 +215,7 @@ def by_photo(project: Project, reduced: ReducedImages) -> Sequence[list[tuple[st
     return found
 
 
-IMAGES, ORIENTATION, CONTROL, NAMES = ".im", ".ori", ".con", "names.csv"
+IMAGES, ORIENTATION, CONTROL = ".im", ".ori", ".con"
 MICROMETRES = 1e-3
 DIGITS = 6  # Digits of principal distances in millimetres; files have three of micrometres
 
@@ -227,48 +226,17 @@ def read_patb(path: Path, options: ReadOptions) -> Project:
     images = path if path.is_file() else one_file(folder, IMAGES)
     if images is None:
         raise InputError(phrase("format.files", name=f"*{IMAGES}"), file=path)
-    block = ReducedBuilder(images, FORMATS["patb"].title, options, _names(folder / NAMES))
+    block = ReducedBuilder(images, FORMATS["patb"].title, options, read_names(folder / NAMES))
 
     def add(photo: str, card: Card) -> None:
         c = card.number(1, "the principal distance") * MICROMETRES
         block.photo(photo, block.principal_distance(c, card.place), card.place)
 
     block.add_images(add, MICROMETRES, ends_empty=False)
-    if (orientation := one_file(folder, ORIENTATION)) is not None:
-        _orientation(orientation, block)
-    if (control := one_file(folder, CONTROL)) is not None:
-        for card in _filled(control):
-            xyz = card.numbers(1, "X Y Z")
-            codes = [card.number(k, "a code") for k in range(4, min(len(card.words), 6))]
-            # A single code applies to all coordinates, two to position and height.
-            level, height = (code > 0 for code in (codes[0], codes[-1])) if codes else (False, False)
-            block.known_point(block.name(card), xyz, np.array([level, level, height]), card.place)
-    return block.reduced_project("um")
-
-
-def _filled(path: Path) -> Sequence[Card]:
-    return [card for card in cards(path) if card.words and not card.ends]
-
-
-def _names(path: Path) -> dict[str, str]:
-    """Return names by number from a table `number, name`; empty without file."""
-    if not path.is_file():
-        return {}
-    table = read_columns(path, known=("number", "name"))
-    table.require("number", "name")
-    table.names("number")
-    found: dict[str, str] = {}
-    for row, (number, name) in enumerate(zip(table.texts("number"), table.texts("name"), strict=True)):
-        if number in found or not name:
-            raise table.error(row, phrase("format.name", what="number", name=number))
-        found[number] = name
-    return found
-
-
-def _orientation(path: Path, block: ReducedBuilder) -> None:
-    """Add poses: angles in the line of the centre, or the matrix in the lines after it."""
-    lines = iter(_filled(path))
+    orientation = one_file(folder, ORIENTATION)
+    lines = iter([] if orientation is None else _filled(orientation))
     for head in lines:
+        # Angles are in the line of the centre, the elements of a matrix in the lines after it.
         centre = head.numbers(1, "X Y Z")
         if len(head.words) >= 7:
             matrix = block.turn(head, 4, None)
@@ -282,6 +250,18 @@ def _orientation(path: Path, block: ReducedBuilder) -> None:
                 raise head.place.error(phrase("format.count", n=len(elements), required=9))
             matrix = checked_rotation(head.place, np.array(elements).reshape(3, 3), 1e-4)
         block.pose(block.name(head), centre, matrix, head.place)
+    if (control := one_file(folder, CONTROL)) is not None:
+        for card in _filled(control):
+            xyz = card.numbers(1, "X Y Z")
+            codes = [card.number(k, "a code") for k in range(4, min(len(card.words), 6))]
+            # A single code applies to all coordinates, two to position and height.
+            level, height = (code > 0 for code in (codes[0], codes[-1])) if codes else (False, False)
+            block.known_point(block.name(card), xyz, np.array([level, level, height]), card.place)
+    return block.reduced_project("um")
+
+
+def _filled(path: Path) -> Sequence[Card]:
+    return [card for card in cards(path) if card.words and not card.ends]
 
 
 def lost_in_patb(project: Project) -> list[Phrase]:
@@ -304,7 +284,13 @@ def write_patb(project: Project) -> Mapping[str, bytes]:
             f"{numbers[point]:12d}{x / MICROMETRES:16.4f}{y / MICROMETRES:16.4f}    0" for point, x, y in own
         ]
         images.append(f"{END:>12}")
-    files = {f"block{IMAGES}": images, f"block{ORIENTATION}": _oriented(project, reduced, numbers)}
+    oriented: list[str] = []
+    for row in np.flatnonzero(reduced.posed).tolist():
+        centre = "".join(f"{own:16.5f}" for own in block.photo_positions[row])
+        elements = [f"{own:16.12f}" for own in reduced.matrices[row].ravel()]
+        oriented.append(f"{numbers[block.photo_ids[row]]:16d}{'':16}{centre}")
+        oriented += ["".join(elements[:5]), "".join(elements[5:])]
+    files = {f"block{IMAGES}": images, f"block{ORIENTATION}": oriented}
     control = [
         f"{numbers[name]:12d}{''.join(f'{0.0 if np.isnan(own) else own:17.5f}' for own in position)}"
         f"{int(held[:2].all()):5d}{int(held[2]):5d}"
@@ -312,22 +298,7 @@ def write_patb(project: Project) -> Mapping[str, bytes]:
     ]
     files[f"block{CONTROL}"] = [*control, f"{END:>12}"] if control else []
     found = {name: ("\n".join(lines) + "\n").encode() for name, lines in files.items() if lines}
-    if any(str(number) != name for name, number in numbers.items()):
-        found[NAMES] = csv_text({"number": list(numbers.values()), "name": list(numbers)})
-    return found
-
-
-def _oriented(project: Project, reduced: ReducedImages, numbers: Mapping[str, int]) -> list[str]:
-    lines = []
-    for row in np.flatnonzero(reduced.posed).tolist():
-        centre = "".join(f"{own:16.5f}" for own in project.block.photo_positions[row])
-        elements = [f"{own:16.12f}" for own in reduced.matrices[row].ravel()]
-        lines += [
-            f"{numbers[project.block.photo_ids[row]]:16d}{'':16}{centre}",
-            "".join(elements[:5]),
-            "".join(elements[5:]),
-        ]
-    return lines
+    return found | names_file(numbers, "number")
 
 
 IMAGE_DAT, ORIENTATION_DAT, CAMERAS = "image.dat", "orientation.dat", "cameras.csv"
@@ -373,7 +344,7 @@ def lost_in_bingo(project: Project) -> list[Phrase]:
 def _words(project: Project) -> dict[str, str]:
     """Return names as words of the files."""
     found: dict[str, str] = {}
-    cameras = reduced_images(project).names
+    cameras = [each.name for each in known_cameras(project.block)[0]]
     for names in (project.block.photo_ids, project.block.point_ids, cameras):
         own = {name: "_".join(name.split()) for name in names}
         last = {word: name for name, word in own.items()}

@@ -22,22 +22,12 @@ from photogram.formats.models import (
 from photogram.formats.plain.statement_tables import parts_of_asked
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
-from photogram.formats.xml_stream import check_root
+from photogram.formats.xml_stream import SUFFIXES, read_stream, root_of
 from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import turned
 from photogram.results.result import Result
 from photogram.words import phrase
-
-__all__ = [
-    "FORMATS",
-    "adjusting",
-    "cannot_hold",
-    "read",
-    "recognised",
-    "target",
-    "to_files",
-]
 
 _TO_WRITE: Mapping[str, Format] = ChainMap(FORMATS_OF_CAMERAS, FORMATS)  # The order is that of FORMATS
 SD = ("images", "control", "check", "gnss")
@@ -75,7 +65,8 @@ def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
         names = [f"{where.name}: --format {each.name}" for each, where in found]
         raise InputError(phrase("format.ambiguous", names=names), file=path)
     for file in files:
-        check_root(file)
+        if file.suffix.lower() in SUFFIXES and not (root := root_of(file)[0]):
+            read_stream(file, {}, root)  # Its error names the syntax
     names = [f"{each.title} ({each.name})" for each in FORMATS.values()]
     of_folder = [each.title for each in FORMATS.values() if path.is_file() and each.recognises(path.parent)]
     code = "format.folder" if len(of_folder) == 1 else "format.unrecognised"
@@ -168,15 +159,9 @@ class Target:
         if self.file is None:
             return {self.folder / name: content for name, content in found.items()}
         own, new = Path(self.format.files[0]), Path(self.file)
-        names = {
-            name: new.name
-            if name == own.name
-            else f"{new.stem}{Path(name).suffix}"
-            if Path(name).stem == own.stem
-            else name
-            for name in found
-        }
-        return {self.folder / names[name]: content for name, content in found.items()}
+        alike = [name for name in found if Path(name).stem == own.stem]
+        names = {name: f"{new.stem}{Path(name).suffix}" for name in alike} | {own.name: new.name}
+        return {self.folder / names.get(name, name): content for name, content in found.items()}
 
 
 def target(path: Path, file_format: str | None = None) -> Target:

@@ -21,12 +21,13 @@ from photogram.formats.plain.reading import read_control
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.statement_tables import with_cover
 from photogram.formats.plain.tables import Tables, Transform, indices_of
-from photogram.formats.project import Frame, Project, Repeated
+from photogram.formats.project import Project, Repeated
 from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
 from photogram.messages import Message
 from photogram.network.block import Block
+from photogram.network.frame import Frame
 from photogram.network.motion import timed_photos
 from photogram.network.similarity import similarity
 from photogram.network.wider_models import (
@@ -242,37 +243,31 @@ def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: 
     return project.replace(block=larger, starts=np.vstack([project.starts, fill]))
 
 
-def _known_photos(project: Project, given: ControlList) -> ColumnTable:
-    """Return observations in photos of the project, with their names."""
-    exact = set(project.block.photo_ids)
-    plain: dict[str, list[str]] = {}
-    for name in project.block.photo_ids:
-        plain.setdefault("_".join(name.split()), []).append(name)
-    table = given.images
-    names = [
-        name if name in exact else plain[name][0] if len(plain.get(name, ())) == 1 else ""
-        for name in table.texts("photo")
-    ]
-    rows = [row for row, name in enumerate(names) if name]
-    if len(rows) < len(names):
-        lost = sorted({own for own, name in zip(table.texts("photo"), names, strict=True) if not name})
-        given.messages.append(Message(phrase("plain.other-photos", names=lost), table.path))
-    return table.some(rows).with_texts("photo", [names[row] for row in rows])
-
-
 def _with_list(project: Project, given: ControlList) -> Project:
     """Return a project with the image observations of a list of control points.
 
     A track with the identifier of a control point is another point and is renamed, unless both have an equal
     observation.
     """
-    table = _known_photos(project, given)
+    exact, plain = set(project.block.photo_ids), dict[str, list[str]]()
+    for name in project.block.photo_ids:
+        plain.setdefault("_".join(name.split()), []).append(name)
+    photos = [
+        name if name in exact else plain[name][0] if len(plain.get(name, ())) == 1 else ""
+        for name in given.images.texts("photo")
+    ]
+    rows = [row for row, name in enumerate(photos) if name]
+    if len(rows) < len(photos):
+        pairs = zip(given.images.texts("photo"), photos, strict=True)
+        lost = sorted({own for own, name in pairs if not name})
+        given.messages.append(Message(phrase("plain.other-photos", names=lost), given.images.path))
+    table = given.images.some(rows).with_texts("photo", [photos[row] for row in rows])
     known, points = _image_rows(project.block), table.texts("point")
-    pairs = dict(enumerate(zip(table.texts("photo"), points, strict=True)))
-    present = {row for row, pair in pairs.items() if pair in known}
+    images = dict(enumerate(zip(table.texts("photo"), points, strict=True)))
+    present = {row for row, image in images.items() if image in known}
     if present:
         there, listed = to_corner(project), corner_of(table, None)
-        present = {row for row in present if np.abs(there[known[pairs[row]]] - listed[row]).max() <= SAME}
+        present = {row for row in present if np.abs(there[known[images[row]]] - listed[row]).max() <= SAME}
     other = project.tracks.intersection(given.control.texts("point")) - {points[row] for row in present}
     if other:
         new = {name: f"track {name}" for name in project.block.point_ids if name in other}

@@ -60,8 +60,6 @@ def project_of(calibration: Calibration, path: Path | None = None) -> Project:
         path=path or Path("corners"),
         title=FORMATS["targets"].title,
         sizes=tuple(corners.sizes),
-        pixel_mm=(None,) * len(calibration.cameras),
-        starts=np.asarray(block.point_positions),
         lacks=tuple(lacks),
         messages=tuple(calibration.messages),
         boards={"board": calibration.board.replace(shape=calibration.shape)},

@@ -147,12 +147,6 @@ def root_of(path: Path) -> tuple[str, Mapping[str, str]]:
     return found[0] if found else ("", {})
 
 
-def check_root(path: Path) -> None:
-    """Reject a file with an XML suffix without a readable root element."""
-    if path.suffix.lower() in SUFFIXES and not (root := root_of(path)[0]):
-        read_stream(path, {}, root)
-
-
 def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: str) -> Element:
     """Read a file; return its root without the processed elements."""
     stack: list[Element] = []

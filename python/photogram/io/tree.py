@@ -123,6 +123,12 @@ class Tree:
             raise self.value_error("error.choice", names=list(words))
         return self.value
 
+    def known(self, what: str, names: Collection[str]) -> str:
+        """Return a known word; the error of another one suggests a similar one."""
+        if not isinstance(self.value, str) or self.value not in names:
+            raise self.error(unknown_name(what, str(self.value), names))
+        return self.value
+
     def word(self) -> str:
         """Return a name or a number of something, which may be written as an integer."""
         return str(self._as(str | int, "error.name"))
@@ -155,8 +161,3 @@ class Tree:
         if not name or not name.isprintable():
             raise self.value_error("toml.file")
         return self.file.parent / name
-
-
-def unknown(tree: Tree, what: str, known: Mapping[str, Any]) -> InputError:
-    """Return an error for an unknown word."""
-    return tree.error(unknown_name(what, str(tree.value), known))

@@ -21,6 +21,7 @@ from photogram.io.tree import Tree
 from photogram.io.yaml_text import camera_info, matrix_lines, read_yaml_text
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera, parameter_names
+from photogram.network.opencv_lens import opencv_lens
 from photogram.stellar.parameters import COMMON, INTERIOR
 from photogram.stellar.sky import TAU
 from photogram.words import phrase
@@ -296,8 +297,7 @@ def _turned(rays: Floats) -> Floats:
 YamlForm = Literal["opencv", "ros"]  # Format of the file
 
 _MODELS = {"plumb_bob": ("brown", _BROWN), "equidistant": ("kannala_brandt", _KANNALA_BRANDT)}
-_OF_LENSES = {"brown": "plumb_bob", "equidistant": "equidistant", "kannala_brandt": "equidistant"}
-WITH_YAML = frozenset(_OF_LENSES)  # Lenses supported in YAML
+WITH_YAML = ("brown", "equidistant", "kannala_brandt")  # Lenses supported in YAML
 _MATRIX = ("camera_matrix", "Camera_Matrix", "K")
 _DISTORTION = ("distortion_coefficients", "Distortion_Coefficients", "dist_coeffs", "D")
 
@@ -323,25 +323,24 @@ def to_yaml(camera: SkyCamera, frame: tuple[float, float], form: YamlForm, name:
     InputError
         If the lens is not supported.
     """
-    if camera.lens not in _OF_LENSES:
-        raise InputError(phrase("stars.no-yaml", lens=camera.lens, lenses=list(_OF_LENSES)))
+    if camera.lens not in WITH_YAML:
+        raise InputError(phrase("stars.no-yaml", lens=camera.lens, lenses=list(WITH_YAML)))
     one_of("form", form, get_args(YamlForm))
-    model = _OF_LENSES[camera.lens]
-    order = (*_SQUARE, *_MODELS[model][1])
-    known = camera.as_camera()
-    sd = dict(zip(known.names, known.deviations.tolist(), strict=True))
-    fx, fy, cx, cy, *coefficients = (known.parameters[name] for name in order)
-    matrix = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-    width, height = round(frame[0]), round(frame[1])
+    known, (width, height) = camera.as_camera(), map(round, frame)
+    lens = opencv_lens(known)
+    assert lens is not None
+    model, coefficients = lens.ros
     if form == "ros":
-        return camera_info(name, (width, height), matrix, (model, coefficients))
+        return camera_info(name, (width, height), lens.matrix, lens.ros)
+    order = (*_SQUARE, *_MODELS[model][1])
+    sd = dict(zip(known.names, known.deviations.tolist(), strict=True))
     lines = [
         "%YAML:1.0",
         "---",
         f"image_width: {width}",
         f"image_height: {height}",
-        f"fisheye_model: {int(model == 'equidistant')}",
-        *matrix_lines("camera_matrix", matrix, opencv=True),
+        f"fisheye_model: {int(lens.fisheye)}",
+        *matrix_lines("camera_matrix", lens.matrix, opencv=True),
         *matrix_lines("distortion_coefficients", [coefficients], opencv=True),
         f"# of {', '.join(order)}",
         *matrix_lines("standard_deviations", [[sd[name] for name in order]], opencv=True),

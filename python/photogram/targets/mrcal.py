@@ -26,6 +26,7 @@ from photogram.io.files import read_text
 from photogram.io.places import Place, at_place
 from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
+from photogram.network.opencv_lens import TERMS, opencv_lens
 from photogram.targets.board import Board
 from photogram.targets.calibration import Calibration
 from photogram.targets.calibration_result import Calibrated
@@ -33,7 +34,7 @@ from photogram.targets.corner_files import KEY
 from photogram.targets.corners import Corners
 from photogram.targets.maps import UncertaintyMap
 from photogram.targets.npz_arrays import Arrays, read_arrays
-from photogram.targets.output import TERMS, Rig, terms_of
+from photogram.targets.output import Rig
 from photogram.targets.vision import inverted, of_vectors
 from photogram.words import phrase
 
@@ -251,7 +252,7 @@ def _lens(rig: Rig, row: int) -> tuple[str, Floats]:
         return "STEREOGRAPHIC", camera.values[:4]
     if camera.model == "cahvor":
         return "CAHVOR", camera.values
-    lens = terms_of(camera)
+    lens = opencv_lens(camera)
     if lens is None or lens.fisheye:
         raise rig.refusal(
             row, "a .cameramodel of mrcal", ["opencv8", "opencv5", "opencv12", "cahvor", KNOTTED]

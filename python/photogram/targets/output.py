@@ -6,7 +6,7 @@ written by row.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 
 import numpy as np
@@ -17,58 +17,10 @@ from photogram.errors import InputError
 from photogram.io.yaml_text import camera_info, figures, matrix_lines
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
+from photogram.network.opencv_lens import TERMS, OpencvLens, opencv_lens
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.vision import cross_matrices, inverted
 from photogram.words import phrase
-
-# Pinhole, in the order of OpenCV; k4, k5, k6 are in the denominator
-TERMS = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "s1", "s2", "s3", "s4")
-FISHEYE_TERMS = ("k1", "k2", "k3", "k4")
-PINHOLES = frozenset(
-    {"simple_pinhole", "pinhole", "simple_radial", "radial", "opencv", "full_opencv", "opencv_pinhole"}
-)
-FISHEYES = frozenset(
-    {"simple_fisheye", "fisheye", "simple_radial_fisheye", "radial_fisheye", "opencv_fisheye"}
-)
-_OTHER_NAMES = {"k": "k1"}
-
-
-@dataclass(frozen=True)
-class Terms:
-    """Lens of the pinhole or fisheye type."""
-
-    fisheye: bool  # Whether it is equidistant
-    focal: tuple[float, float]  # fx, fy and cx, cy
-    centre: tuple[float, float]
-    terms: Mapping[str, float]  # By name; missing terms are 0
-
-    @property
-    def matrix(self) -> Floats:
-        """(3, 3) K."""
-        (fx, fy), (cx, cy) = self.focal, self.centre
-        return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
-
-    def first(self, count: int) -> list[float] | None:
-        """Return the first terms in OpenCV order; None if others are not 0."""
-        order = FISHEYE_TERMS if self.fisheye else TERMS
-        if any(value for name, value in self.terms.items() if name not in order[:count]):
-            return None
-        return [self.terms.get(name, 0.0) for name in order[:count]] + [0.0] * (count - len(order))
-
-    def fewest(self, counts: tuple[int, ...]) -> list[float] | None:
-        """Return the terms for the first sufficient count; None if all are too small."""
-        return next((found for each in counts if (found := self.first(each)) is not None), None)
-
-
-def terms_of(camera: Camera) -> Terms | None:
-    """Return a camera as an exactly equivalent lens; None if impossible."""
-    if camera.model not in PINHOLES | FISHEYES:
-        return None
-    values = camera.parameters
-    focal = (values["f"], values["f"]) if "f" in values else (values["fx"], values["fy"])
-    core = {"f", "fx", "fy", "cx", "cy"}
-    terms = {_OTHER_NAMES.get(name, name): value for name, value in values.items() if name not in core}
-    return Terms(camera.model in FISHEYES, focal, (values["cx"], values["cy"]), terms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,11 +57,13 @@ class Rig:
             raise InputError(phrase("targets.no-size", camera=self.names[camera]))
         return found
 
-    def lenses(self, title: str, models: Sequence[str], fits: Callable[[Terms], bool]) -> list[Terms]:
+    def lenses(
+        self, title: str, models: Sequence[str], fits: Callable[[OpencvLens], bool]
+    ) -> list[OpencvLens]:
         """Return the lenses of all cameras; InputError: if a format does not support one."""
         found = []
         for row, camera in enumerate(self.cameras):
-            lens = terms_of(camera)
+            lens = opencv_lens(camera)
             if lens is None or not fits(lens):
                 raise self.refusal(row, title, models)
             found.append(lens)
@@ -155,7 +109,7 @@ def opencv_yaml(rig: Rig) -> dict[str, bytes]:
     }
 
 
-def _opencv_camera(rig: Rig, row: int, lenses: list[Terms]) -> list[str]:
+def _opencv_camera(rig: Rig, row: int, lenses: list[OpencvLens]) -> list[str]:
     lens, (width, height), calibrated = lenses[row], rig.size(row), rig.calibrated
     terms = lens.first(4) if lens.fisheye else lens.fewest(COUNTS[COUNTS.index(MIN_PINHOLE_TERMS) :])
     lines = [f"image_width: {width}", f"image_height: {height}"]
@@ -188,9 +142,6 @@ def _opencv_camera(rig: Rig, row: int, lenses: list[Terms]) -> list[str]:
     return lines
 
 
-PLUMB_BOB_TERMS, RATIONAL_TERMS, EQUIDISTANT_TERMS = 5, 8, 4
-
-
 def ros_camera_info(rig: Rig) -> dict[str, bytes]:
     """Return one file per camera in the format of ROS (`sensor_msgs/CameraInfo`).
 
@@ -198,27 +149,17 @@ def ros_camera_info(rig: Rig) -> dict[str, bytes]:
     projection of the second contains -fx b with the base b. Other cameras are not rectified.
     """
     models = ["opencv5", "opencv8", "opencv_fisheye"]
-    lenses = rig.lenses("camera_info of ROS", models, lambda lens: bool(_distortion(lens)[1]))
+    lenses = rig.lenses("camera_info of ROS", models, lambda lens: bool(lens.ros[1]))
     rectified: list[tuple[Floats, Floats] | tuple[()]] = [()] * len(lenses)
     if len(lenses) == 2 and rig.tied(1):
         rectified = [*_rectified(rig.sensors[1], lenses)]
     return {
-        f"{rig.files[row]}.yaml": camera_info(
-            rig.names[row], rig.size(row), lens.matrix, _distortion(lens), *turned
-        )
+        f"{rig.files[row]}.yaml": camera_info(rig.names[row], rig.size(row), lens.matrix, lens.ros, *turned)
         for row, (lens, turned) in enumerate(zip(lenses, rectified, strict=True))
     }
 
 
-def _distortion(lens: Terms) -> tuple[str, list[float]]:
-    if lens.fisheye:
-        return "equidistant", lens.first(EQUIDISTANT_TERMS) or []
-    if (terms := lens.first(PLUMB_BOB_TERMS)) is not None:
-        return "plumb_bob", terms
-    return "rational_polynomial", lens.first(RATIONAL_TERMS) or []
-
-
-def _rectified(sensor: Floats, lenses: list[Terms]) -> list[tuple[Floats, Floats]]:
+def _rectified(sensor: Floats, lenses: list[OpencvLens]) -> list[tuple[Floats, Floats]]:
     """Return rotation and (3, 4) projection of both cameras.
 
     Each is rotated by half of the rotation between them, then both so that the base is the x axis. Both use
@@ -260,7 +201,7 @@ def kalibr_camchain(rig: Rig) -> dict[str, bytes]:
     for row in range(len(rig.cameras)):
         if not (rig.tied(row) and rig.tied(max(row - 1, 0))):
             raise rig.refusal(row, KALIBR_TITLE, [], "targets.refused-tie")
-        lens = terms_of(rig.cameras[row])
+        lens = opencv_lens(rig.cameras[row])
         if lens is None or lens.first(KALIBR_TERMS) is None:
             code = "targets.refused" if lens is None else "targets.refused-terms"
             raise rig.refusal(row, KALIBR_TITLE, ["opencv4", "opencv_fisheye"], code)

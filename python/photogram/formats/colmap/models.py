@@ -11,12 +11,11 @@ import numpy as np
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder, FrameOf, Rig
-from photogram.formats.colmap import content
-from photogram.formats.colmap.files import binary_files, read_model, text_files
+from photogram.formats.colmap import files
 from photogram.formats.format import FORMATS
 from photogram.formats.images import Y_DOWN, lens_of, sizes_of, to_corner
 from photogram.formats.models import attitude_matrices, complete_positions, known_cameras
-from photogram.formats.names import NAMES, NamedValues, names_file, numbered, renamed
+from photogram.formats.names import NAMES, NamedValues, names_file, numbered, with_names
 from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.recognition import colmap
@@ -43,16 +42,28 @@ def read(path: Path, options: ReadOptions) -> Project:
     folder = colmap(path)
     if folder is None:
         raise InputError(phrase("colmap.files"), file=path)
-    return renamed(_project(read_model(folder), path), folder / NAMES)
+    project = _project(files.read_model(folder), path)
+    return with_names(project, folder / NAMES) if (folder / NAMES).is_file() else project
 
 
-def _project(model: content.Model, path: Path) -> Project:
+def _project(model: files.Model, path: Path) -> Project:
     block, images = BlockBuilder(path, FORMATS["colmap"].title), model.images
     for each in model.cameras:
-        block.camera(_camera(each), (each.width, each.height), key=each.number, place=each.place)
+        values = dict(zip(files.MODELS[each.model], each.parameters, strict=True))
+        with at_place(each.place):
+            camera = Camera(each.model.lower(), values, name=str(each.number), unit="px")
+        block.camera(camera, (each.width, each.height), key=each.number, place=each.place)
     for image in images:
         block.photo(image.number, image.camera, image.place, name=image.name)
-    _check_model(model)
+    finite = np.isfinite(model.features["xy"]).all(axis=1)
+    if not finite.all():
+        row = int(np.searchsorted(np.cumsum(model.counts), np.argmin(finite), side="right"))
+        raise images[row].place.error(phrase("format.finite", name="a feature"))
+    _check_finite(model.points["xyz"], model.point_places, "the position")
+    _, first = np.unique(numbers := model.points["number"], return_index=True)
+    if len(first) < len(numbers):
+        row = int(np.setdiff1d(np.arange(len(numbers)), first)[0])
+        raise model.point_places[row].error(phrase("format.repeated", what="point", name=str(numbers[row])))
     names = list(block.photo_ids)
     rotations, translations, off = _rigid([each.pose for each in images], [each.place for each in images])
     if len(off):
@@ -74,25 +85,6 @@ def _project(model: content.Model, path: Path) -> Project:
             "colours": NamedValues(block.point_ids, model.points["rgb"]),
         }
     )
-
-
-def _camera(camera: content.Camera) -> Camera:
-    values = dict(zip(content.MODELS[camera.model], camera.parameters, strict=True))
-    with at_place(camera.place):
-        return Camera(camera.model.lower(), values, name=str(camera.number), unit="px")
-
-
-def _check_model(model: content.Model) -> None:
-    """Reject positions of features and points that are not finite, and repeated points."""
-    finite = np.isfinite(model.features["xy"]).all(axis=1)
-    if not finite.all():
-        row = int(np.searchsorted(np.cumsum(model.counts), np.argmin(finite), side="right"))
-        raise model.images[row].place.error(phrase("format.finite", name="a feature"))
-    _check_finite(model.points["xyz"], model.point_places, "the position")
-    _, first = np.unique(numbers := model.points["number"], return_index=True)
-    if len(first) < len(numbers):
-        row = int(np.setdiff1d(np.arange(len(numbers)), first)[0])
-        raise model.point_places[row].error(phrase("format.repeated", what="point", name=str(numbers[row])))
 
 
 def _check_finite(values: Floats, places: Sequence[Place], name: str) -> None:
@@ -117,7 +109,7 @@ def _rigid(poses: Sequence[Sequence[float]], places: Sequence[Place]) -> tuple[F
 
 
 def _composed(
-    model: content.Model, rotations: Floats, translations: Floats, messages: list[Message]
+    model: files.Model, rotations: Floats, translations: Floats, messages: list[Message]
 ) -> list[FrameOf]:
     """Compose poses of frames and rigs to poses of images."""
     if not model.frames:
@@ -133,7 +125,7 @@ def _composed(
         if frame.rig not in numbers:
             raise place.error(phrase("format.undefined", what="rig", name=str(frame.rig)))
         photos: dict[str, int] = {}
-        for sensor, image in ((own.number, own.image) for own in frame.data if own.kind == content.CAMERA):
+        for sensor, image in ((own.number, own.image) for own in frame.data if own.kind == files.CAMERA):
             if image not in rows:
                 raise place.error(phrase("format.undefined", what="image", name=str(image)))
             row = rows[image]
@@ -158,14 +150,14 @@ def _composed(
 
 
 def _mounted_sensors(
-    model: content.Model, cameras: Mapping[int, str]
+    model: files.Model, cameras: Mapping[int, str]
 ) -> tuple[dict[tuple[int, int], tuple[Floats, Floats] | None], dict[int, Rig]]:
     """Return poses of cameras on rigs (None: unknown), and rigs by frame camera."""
     poses: dict[tuple[int, int], tuple[Floats, Floats] | None] = {}
     rigs: dict[int, Rig] = {}
     for rig in model.rigs:
         sensors: dict[str, Sensor] = {}
-        for number, pose in ((own.number, own.pose) for own in rig.sensors if own.kind == content.CAMERA):
+        for number, pose in ((own.number, own.pose) for own in rig.sensors if own.kind == files.CAMERA):
             if number not in cameras:
                 raise rig.place.error(phrase("format.undefined", what="camera", name=str(number)))
             poses[rig.number, number] = None
@@ -174,20 +166,20 @@ def _mounted_sensors(
                 poses[rig.number, number] = rigid = turns[0], shifts[0]
                 name = f"rig {rig.number}, camera {number}"
                 sensors[cameras[number]] = Sensor.from_colmap(name, *rigid)
-        for reference in (own.number for own in rig.reference if own.kind == content.CAMERA):
+        for reference in (own.number for own in rig.reference if own.kind == files.CAMERA):
             poses[rig.number, reference] = np.eye(3), np.zeros(3)
             rigs[rig.number] = Rig(str(rig.number), cameras.get(reference, ""), sensors)
     return poses, rigs
 
 
-def _observed(model: content.Model, messages: list[Message]) -> tuple[Indices, Indices]:
+def _observed(model: files.Model, messages: list[Message]) -> tuple[Indices, Indices]:
     """Return rows of features that are images of points, and the rows of the points."""
     named, own = model.features["point"].copy(), model.points["number"].astype(np.int64)
-    features = np.flatnonzero(named != content.NO_POINT)
+    features = np.flatnonzero(named != files.NO_POINT)
     order = np.argsort(own, kind="stable")
     numbers, wanted = own[order], named[features]
     at = np.searchsorted(numbers, wanted)
-    known = np.append(numbers, content.NO_POINT)[at] == wanted
+    known = np.append(numbers, files.NO_POINT)[at] == wanted
     rows = order[at[known]]
     missing = np.unique(wanted[~known]).tolist()
     counts = np.bincount(rows, minlength=len(own))
@@ -225,15 +217,15 @@ def _told_by_cameras(mounts: Sequence[Mount], cameras: Mapping[str, int]) -> boo
 def write(kind: str, project: Project) -> Mapping[str, bytes]:
     """Return the text or binary files of a project."""
     written = _written(project)
-    files = text_files if kind == "text" else binary_files
-    return {**files(written.model), **names_file(written.points)}
+    own = (files.text_files if kind == "text" else files.binary_files)(written.model)
+    return {**own, **names_file(written.points)}
 
 
 @dataclass(frozen=True)
 class _Written:
     """A model with the numbers of photos, points and cameras."""
 
-    model: content.Model
+    model: files.Model
     photos: dict[str, int]
     points: dict[str, int]
     cameras: dict[str, int]
@@ -256,9 +248,9 @@ def _written(project: Project) -> _Written:
     positions = complete_positions(project)
     point_rows = np.flatnonzero(np.isfinite(positions).all(axis=1))
     points = numbered([block.point_ids[row] for row in point_rows], details.get("point numbers"))
-    matrices = attitude_matrices(block)[rows]
-    translations = -np.einsum("nij,nj->ni", Y_DOWN @ matrices.transpose(0, 2, 1), block.photo_positions[rows])
-    quaternions = Attitudes(matrices).values("quaternion_to_vision")
+    attitudes = Attitudes(attitude_matrices(block)[rows])
+    quaternions = attitudes.values("quaternion_to_vision")
+    translations = attitudes.translations(block.photo_positions[rows])
     poses = dict(zip(photos, map(tuple, np.hstack([quaternions, translations]).tolist()), strict=True))
     of_rows = (numbers[cameras[photo_cameras[row]].name] for row in rows)
     of_photo = dict(zip(photos, of_rows, strict=True))
@@ -269,38 +261,38 @@ def _written(project: Project) -> _Written:
     numbers_of_photos[rows] = list(photos.values())
     owners = numbers_of_photos[block.image_photos[image_rows]]
     image_rows = image_rows[np.argsort(owners, kind="stable")]
-    point_numbers = np.full(len(block.point_ids), content.NO_POINT, dtype=np.int64)
+    point_numbers = np.full(len(block.point_ids), files.NO_POINT, dtype=np.int64)
     point_numbers[point_rows] = list(points.values())
-    features = np.empty(len(image_rows), content.FEATURE)
+    features = np.empty(len(image_rows), files.FEATURE)
     features["xy"] = to_corner(project)[image_rows]
     features["point"] = point_numbers[block.image_points[image_rows]]
     names = sorted(photos, key=lambda name: photos[name])
     parts = np.split(features, np.searchsorted(np.sort(owners), [photos[name] for name in names])[1:])
     images = [
-        content.Image(photos[name], poses[name], of_photo[name], name, part)
+        files.Image(photos[name], poses[name], of_photo[name], name, part)
         for name, part in zip(names, parts, strict=True)
     ]
     point_rows = point_rows[np.argsort(point_numbers[point_rows], kind="stable")]
     colours = details.get("colours", {})
-    table = np.zeros(len(point_rows), content.POINT)
+    table = np.zeros(len(point_rows), files.POINT)
     table["number"], table["xyz"], table["error"] = point_numbers[point_rows], positions[point_rows], -1.0
     rgb = [colours.get(block.point_ids[row], (0, 0, 0)) for row in point_rows.tolist()]
     table["rgb"] = np.array(rgb, dtype=np.int64).reshape(-1, 3)
     records.sort(key=lambda camera: camera.number)
-    model = content.Model(project.path, records, images, table, rigs, frames)
+    model = files.Model(project.path, records, images, table, rigs, frames)
     return _Written(model, photos, points, numbers, image_rows)
 
 
-def _record(camera: Camera, size: Size, number: int) -> content.Camera:
+def _record(camera: Camera, size: Size, number: int) -> files.Camera:
     model = camera.model.upper()
-    if model in content.MODELS and camera.unit == "px":
-        return content.Camera(number, model, *size, tuple(camera.values.tolist()))
+    if model in files.MODELS and camera.unit == "px":
+        return files.Camera(number, model, *size, tuple(camera.values.tolist()))
     lens = lens_of(camera, size)
-    if lens is None:
+    if lens is None or (terms := lens.first(8)) is None:
         raise InputError(phrase("format.model", camera=camera.title, model=camera.model, title="COLMAP"))
-    if lens.fx == lens.fy and lens.is_plain("k1", "k2"):
-        return content.Camera(number, "RADIAL", *size, (lens.fx, lens.cx, lens.cy, lens.k1, lens.k2))
-    return content.Camera(number, "FULL_OPENCV", *size, (lens.fx, lens.fy, lens.cx, lens.cy, *lens.terms))
+    if lens.focal[0] == lens.focal[1] and not any(terms[2:]):
+        return files.Camera(number, "RADIAL", *size, (lens.focal[0], *lens.centre, *terms[:2]))
+    return files.Camera(number, "FULL_OPENCV", *size, (*lens.focal, *lens.centre, *terms))
 
 
 def _rigs(
@@ -309,7 +301,7 @@ def _rigs(
     photos: Mapping[str, int],
     cameras: Mapping[str, int],
     numbers: Mapping[str, int],
-) -> tuple[list[content.Rig], list[content.Frame]]:
+) -> tuple[list[files.Rig], list[files.Frame]]:
     """Return rigs and frames: of mounts, and one for each other camera and photo."""
     sensors: dict[int, dict[int, tuple[float, ...]]] = {}
     members: dict[str, list[str]] = {name: [name] for name in poses}
@@ -326,16 +318,16 @@ def _rigs(
     mounted = {number for own in sensors.values() for number in own}
     rigs = []
     for number in sorted(set(numbers.values()) - mounted):
-        reference = content.Sensor(content.CAMERA, number)
+        reference = files.Sensor(files.CAMERA, number)
         others = tuple(
-            content.MountedSensor(content.CAMERA, other, True, pose)
+            files.MountedSensor(files.CAMERA, other, True, pose)
             for other, pose in sorted(sensors.get(number, {}).items())
         )
-        rigs.append(content.Rig(number, 1 + len(others), (reference,), others))
+        rigs.append(files.Rig(number, 1 + len(others), (reference,), others))
     frames = []
     for name, names in members.items():
-        data = tuple(content.SensorImage(content.CAMERA, cameras[each], photos[each]) for each in names)
-        frames.append(content.Frame(photos[name], cameras[name], poses[name], len(data), data))
+        data = tuple(files.SensorImage(files.CAMERA, cameras[each], photos[each]) for each in names)
+        frames.append(files.Frame(photos[name], cameras[name], poses[name], len(data), data))
     return rigs, sorted(frames, key=lambda each: each.number)
 
 
@@ -369,12 +361,20 @@ def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:
             "observation_quality.bin",
         ],
     }
+    quality = np.empty(len(model.rows), [("image", "<u4"), ("feature", "<u4"), ("values", "<f4", 6)])
+    quality["image"] = np.repeat(model.model.numbers, model.model.counts)
+    quality["feature"] = np.concatenate([np.arange(count) for count in model.model.counts])
+    parts = (result.residuals, result.redundancy, result.standardized)
+    quality["values"] = np.hstack([part[model.rows] for part in parts])
+    # A Exp(rho) is F A' before: r = -F rho.
+    own, jacobian = result.photo_rotation_covariances, np.eye(6)
+    jacobian[3:, 3:] = -Y_DOWN
     return {
         "covariances.json": to_json(about),
-        "photo_covariances.bin": _triangles(photos, _centre_and_rotation(result), "<u4"),
+        "photo_covariances.bin": _triangles(photos, jacobian @ own @ jacobian.T, "<u4"),
         "camera_covariances.bin": _camera_covariances(model, result),
         "point_covariances.bin": _triangles(points, result.point_covariances, "<u8"),
-        "observation_quality.bin": _quality(model, result),
+        "observation_quality.bin": struct.pack("<Q", len(quality)) + quality.tobytes(),
     }
 
 
@@ -384,17 +384,6 @@ def _triangles(rows: Mapping[int, int], covariances: Floats, number: str) -> byt
     lower = packed(covariances[[row for _, row in own]])
     table = np.empty(len(own), [("id", number), ("c", "<f8", lower.shape[1])])
     table["id"], table["c"] = [each for each, _ in own], lower
-    return struct.pack("<Q", len(table)) + table.tobytes()
-
-
-def _quality(model: _Written, result: Result) -> bytes:
-    """Return residuals, redundancy numbers and test values by image."""
-    counts = model.model.counts
-    table = np.empty(len(model.rows), [("image", "<u4"), ("feature", "<u4"), ("values", "<f4", 6)])
-    table["image"] = np.repeat(model.model.numbers, counts)
-    table["feature"] = np.concatenate([np.arange(count) for count in counts])
-    parts = (result.residuals, result.redundancy, result.standardized)
-    table["values"] = np.hstack([part[model.rows] for part in parts])
     return struct.pack("<Q", len(table)) + table.tobytes()
 
 
@@ -410,13 +399,3 @@ def _camera_covariances(model: _Written, result: Result) -> bytes:
         triangle = packed(matrix[np.newaxis])[0].astype("<f8")
         found.append(struct.pack("<II", camera.number, count) + triangle.tobytes())
     return struct.pack("<Q", len(found)) + b"".join(found)
-
-
-def _centre_and_rotation(result: Result) -> Floats:
-    """Return (P, 6, 6) covariances of centres and rotations in camera axes.
-
-    A Exp(rho) is F A' before: r = -F rho.
-    """
-    jacobian = np.eye(6)
-    jacobian[3:, 3:] = -Y_DOWN
-    return np.asarray(jacobian @ result.photo_rotation_covariances @ jacobian.T)

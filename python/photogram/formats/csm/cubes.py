@@ -218,6 +218,10 @@ def read_cube(path: Path) -> Isd:
     code = f"INS{_members(cube.need('Kernels', path), path)['NaifFrameCode'].whole(-(2**31))}"
     size = _members(cube.need("Core", path).need("Dimensions", path), path)
     samples, count = size["Samples"].whole(1), size["Lines"].whole(1)
+    radii = keywords[f"BODY{keywords['BODY_CODE'].whole()}_RADII"]
+    a, other, b = KM * np.array(radii.numbers(3))
+    if a != other or not 0 < b <= a:
+        raise radii.error(phrase("csm.radii", a=a, b=b))
     pointing = read_turns(label, "InstrumentPointing", path)
     rate = not_zero(instrument["LineExposureDuration"]) / 1000
     lines = Lines([[0.0, _start(instrument, keywords), rate]])
@@ -228,7 +232,7 @@ def read_cube(path: Path) -> Isd:
         spacecraft,
         name,
         (samples, count),
-        _radii(keywords),
+        (float(a), float(b)),
         not_zero(keywords[f"{code}_FOCAL_LENGTH"]),
         _detector(instrument, keywords, code),
         Lens("lrolrocnac", (keywords[f"{code}_OD_K"].number(),)),
@@ -255,14 +259,6 @@ def _detector(instrument: Tree, keywords: Tree, code: str) -> Detector:
             "isis": transformed(keywords, code),
         },
     )
-
-
-def _radii(keywords: Tree) -> tuple[float, float]:
-    name = f"BODY{keywords['BODY_CODE'].whole()}_RADII"
-    a, other, b = KM * np.array(keywords[name].numbers(3))
-    if a != other or not 0 < b <= a:
-        raise keywords[name].error(phrase("csm.radii", a=a, b=b))
-    return float(a), float(b)
 
 
 def _start(instrument: Tree, keywords: Tree) -> float:

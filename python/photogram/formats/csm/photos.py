@@ -110,25 +110,22 @@ class SupportedImage:
 
     def __post_init__(self) -> None:
         check_choice(self.pixels, self.interpolation)
-        own = self.trajectory
+        own, isd = self.trajectory, self.isd
         if own is None:
-            own = trajectory_of(self.isd, self.name, interpolation=self.interpolation)
+            own = trajectory_of(isd, self.name, interpolation=self.interpolation)
         object.__setattr__(self, "flown", own)
         # Many sensor names begin with the name of their platform.
-        platform, sensor = self.isd.platform, self.isd.sensor
+        platform, sensor = isd.platform, isd.sensor
         name = sensor if sensor.startswith(platform) else f"{platform} {sensor}"
         camera = Camera("perspective", {"c": -self.isd.focal_length}, name=name)
         object.__setattr__(self, "camera", camera)
-        object.__setattr__(self, "timed", self._photos(own))
-
-    def _photos(self, on: Trajectory) -> tuple[Timed, ...]:
-        isd = self.isd
+        timed = [Timed(self.name, own, time=isd.time)]
         if isd.lines is not None:
-            return (Timed(self.name, on, isd.time, lines=isd.lines, line_sensor=self._line_sensor()),)
-        if isd.framelets is not None:
+            timed = [Timed(self.name, own, isd.time, lines=isd.lines, line_sensor=self._line_sensor())]
+        elif isd.framelets is not None:
             times = map(isd.framelets.time, range(isd.framelets.count))
-            return tuple(Timed(f"{self.name}/{k}", on, time=time) for k, time in enumerate(times))
-        return (Timed(self.name, on, time=isd.time),)
+            timed = [Timed(f"{self.name}/{k}", own, time=time) for k, time in enumerate(times)]
+        object.__setattr__(self, "timed", tuple(timed))
 
     def _line_sensor(self) -> LineSensor:
         """Return the sensor line: the detector line at the start of the image."""

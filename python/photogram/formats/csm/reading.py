@@ -22,7 +22,7 @@ from photogram.formats.csm.isd import (
 )
 from photogram.formats.declarations import declared
 from photogram.io.places import at_place, positive
-from photogram.io.tree import Tree, unknown
+from photogram.io.tree import Tree
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.lens import Lens, LensModel
 from photogram.network.moving_photos import Lines
@@ -52,10 +52,7 @@ APART = 0.01  # Largest difference of the time tables, relative to the span
 def isd_of(tree: Tree) -> Isd:
     """Return the support data in a document."""
     keywords = tree.get("naif_keywords", {})
-    model = tree["name_model"]
-    if model.text() not in _KINDS:
-        raise unknown(model, "sensor model", _KINDS)
-    kind = cast("Any", _KINDS[model.text()])
+    kind = cast("Any", _KINDS[tree["name_model"].known("sensor model", _KINDS)])
     size = tree["image_samples"].whole(1), tree["image_lines"].whole(1)
     code = _instrument(tree, keywords)
     tree, remarks = completed(tree, keywords, code)
@@ -78,14 +75,23 @@ def isd_of(tree: Tree) -> Isd:
     elif kind == "push frame":
         own["framelets"] = _framelets(tree, size[1], float(detector.summing[1]))
     elif "jitter" in tree:
-        own["jitter"] = _jitter(tree["jitter"])
+        jitter = tree["jitter"]
+        coefficients = [jitter[f"{axis}JitterCoefficients"].numbers() for axis in ("sample", "line")]
+        times = np.array(jitter["lineExposureTimes"].numbers())
+        if len(coefficients[0]) != len(coefficients[1]) or not len(times):
+            counts = dict(zip(("samples", "lines"), map(len, coefficients), strict=True))
+            raise jitter.error(phrase("csm.coefficients", **counts))
+        own["jitter"] = Jitter(np.array(coefficients), times)
+    a, b = (tree["radii"][name].number() * _unit(tree["radii"]) for name in ("semimajor", "semiminor"))
+    if not 0 < b <= a:
+        raise tree["radii"].error(phrase("csm.radii", a=a, b=b))
     return Isd(
         tree.file,
         kind,
         tree["name_platform"].text(),
         tree["name_sensor"].text(),
         size,
-        _radii(tree["radii"]),
+        (a, b),
         look * focal_length if focal_length < 0 else focal_length,
         detector,
         _lens(tree, focal_length),
@@ -115,21 +121,10 @@ def _look(
 
 
 def _unit(tree: Tree) -> float:
-    unit = tree.get("unit", "km")
-    if unit.text() not in UNITS:
-        raise unknown(unit, "unit", UNITS)
-    return UNITS[unit.text()]
-
-
-def _radii(tree: Tree) -> tuple[float, float]:
-    a, b = (tree[name].number() * _unit(tree) for name in ("semimajor", "semiminor"))
-    if not 0 < b <= a:
-        raise tree.error(phrase("csm.radii", a=a, b=b))
-    return a, b
+    return UNITS[tree.get("unit", "km").known("unit", UNITS)]
 
 
 def _rows(tree: Tree, width: int) -> Floats:
-    """Return (k, width) numbers."""
     try:
         found = np.array(tree.value, dtype=float)
     except (TypeError, ValueError):
@@ -143,19 +138,17 @@ def _rows(tree: Tree, width: int) -> Floats:
 
 
 def _times(tree: Tree, count: int) -> Floats:
-    """Return one time for each record."""
     times = tree["ephemeris_times"]
     with at_place(times):
         return increasing("ephemeris_times", times.numbers(count))
 
 
 def _positions(tree: Tree) -> Positions:
-    places = _rows(tree["positions"], 3)
-    velocities = _rows(tree["velocities"], 3) if tree.get("velocities", []).value else None
-    if velocities is not None and len(velocities) != len(places):
-        raise tree["velocities"].error(phrase("format.count", n=len(velocities), required=len(places)))
-    unit = _unit(tree)
-    speeds = None if velocities is None else unit * velocities
+    unit, places, speeds = _unit(tree), _rows(tree["positions"], 3), None
+    if tree.get("velocities", []).value:
+        speeds = unit * _rows(tree["velocities"], 3)
+        if len(speeds) != len(places):
+            raise tree["velocities"].error(phrase("format.count", n=len(speeds), required=len(places)))
     return Positions(_times(tree, len(places)), unit * places, speeds)
 
 
@@ -183,22 +176,8 @@ def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
     if lines % height or lines / height > FRAMELETS:
         raise own.error(phrase("csm.framelets", lines=lines, most=FRAMELETS, height=height * summing))
     first = tree["starting_ephemeris_time"].number() + 0.5 * tree["exposure_duration"].number()
-    switches = [tree.get(name, False) for name in ("framelet_order_reversed", "framelets_flipped")]
-    for each in switches:
-        if not isinstance(each.value, bool):
-            raise each.error(phrase("format.boolean", value=str(each.value)))
-    return Framelets(height, round(lines / height), first, every, *(each.value for each in switches))
-
-
-def _jitter(tree: Tree) -> Jitter:
-    coefficients = [
-        [each.number() for each in tree[f"{axis}JitterCoefficients"]] for axis in ("sample", "line")
-    ]
-    times = np.array([each.number() for each in tree["lineExposureTimes"]])
-    if len(coefficients[0]) != len(coefficients[1]) or not len(times):
-        counts = {"samples": len(coefficients[0]), "lines": len(coefficients[1])}
-        raise tree.error(phrase("csm.coefficients", **counts))
-    return Jitter(np.array(coefficients), times)
+    switches = (tree.get(f"framelet{name}", False).switch() for name in ("_order_reversed", "s_flipped"))
+    return Framelets(height, round(lines / height), first, every, *switches)
 
 
 def _lens(tree: Tree, focal_length: float) -> Lens | None:
@@ -207,21 +186,15 @@ def _lens(tree: Tree, focal_length: float) -> Lens | None:
     models = [name for name, _ in optics.items()]
     if len(models) != 1:
         raise optics.error(phrase("format.count", n=len(models), required=1))
-    model = models[0]
-    if model not in _MEMBERS:
-        raise unknown(Tree(model, optics.file, optics.path), "lens", _MEMBERS)
+    model = Tree(models[0], optics.file, optics.path).known("lens", _MEMBERS)
     own = optics[model]
-    members = ("coefficients",) if "coefficients" in own else _MEMBERS[model]
-    found = [value for name in members for value in _flat(own[name])]
+    members = [own[name] for name in (("coefficients",) if "coefficients" in own else _MEMBERS[model])]
+    parts = (each if isinstance(each.value, list) else [each] for each in members)
+    found = [value.number() for part in parts for value in part]
     if not any(found) and model == "radial":
         return None
     with at_place(own):
         return Lens(cast("LensModel", model), tuple(found), focal_length if model == "radtan" else 1.0)
-
-
-def _flat(tree: Tree) -> list[float]:
-    """Return the numbers of a list, or a single number as a list."""
-    return [each.number() for each in tree] if isinstance(tree.value, list) else [tree.number()]
 
 
 def _detector(tree: Tree, keywords: Tree, code: str | None) -> Detector:
@@ -393,14 +366,10 @@ def completed(tree: Tree, keywords: Tree, code: str | None) -> tuple[Tree, tuple
         remarks.append(phrase(origin, name=path, value=str(value), keyword=known))
         own = {**holder, name: value}
         tree = Tree({**tree.value, group: own} if group else own, tree.file)
-    return tree, (*remarks, *_center_in_corner(tree))
-
-
-def _center_in_corner(tree: Tree) -> list[Phrase]:
-    """Return a remark on a frame whose camera axis meets a corner."""
-    offsets = (tree[f"focal2pixel_{axis}s"].numbers(3)[0] for axis in ("sample", "line"))
+    offsets = [tree[f"focal2pixel_{axis}s"].numbers(3)[0] for axis in ("sample", "line")]
+    offsets += [tree["detector_center"][axis].number() for axis in ("sample", "line")]
     middle = _middle("sample")(tree), _middle("line")(tree)
-    center = tree["detector_center"]
-    if None in middle or any(offsets) or any(center[axis].number() for axis in ("sample", "line")):
-        return []
-    return [phrase("csm.corner", sample=middle[0], line=middle[1])]
+    if None not in middle and not any(offsets):
+        # The camera axis of the frame meets a corner.
+        remarks.append(phrase("csm.corner", sample=middle[0], line=middle[1]))
+    return tree, tuple(remarks)

@@ -77,7 +77,14 @@ def read_script(path: Path, options: ReadOptions) -> DbatBuilder:
         take_images(table, content, sd if word is None else positive(element, "sxy", sd))
     if (operations := root.child("operations")) is not None:
         _estimates(operations, content)
-        _datum(operations, content)
+        for each in _operations(operations, "set_datum"):
+            if each.text.strip() == "depend":  # One fixed photo, and a coordinate for scale
+                word = each.attributes.get("ref_cam", "1")
+                number = each.place.whole(word, "ref_cam")
+                if number not in content.poses:
+                    raise each.error(phrase("format.undefined", what="photo with a pose", name=word))
+                content.held.add(number)
+                content.options = AdjustOptions(datum="minimum")
     return content
 
 
@@ -150,19 +157,6 @@ def _estimates(operations: Element, content: DbatBuilder) -> None:
                 )
 
 
-def _datum(operations: Element, content: DbatBuilder) -> None:
-    """Apply the datum `depend`: one fixed photo, and a coordinate for scale."""
-    for each in _operations(operations, "set_datum"):
-        if each.text.strip() != "depend":
-            continue
-        word = each.attributes.get("ref_cam", "1")
-        number = each.place.whole(word, "ref_cam")
-        if number not in content.poses:
-            raise each.error(phrase("format.undefined", what="photo with a pose", name=word))
-        content.held.add(number)
-        content.options = AdjustOptions(datum="minimum")
-
-
 def _cameras(parent: Element, content: DbatBuilder) -> None:
     """Add the cameras of an element by number; the first is 1."""
     for row, each in enumerate(parent.all("camera"), 1):
@@ -179,7 +173,13 @@ def _sensor(element: Element, number: str, messages: list[Message]) -> tuple[Cam
     size = image_size(element.need("image"), width, height)
     sides = _sides(element, size)
     model = element.whole("model") if element.child("model") else PLAIN
-    terms = _terms(element)
+    terms: dict[str, float] = {}
+    for letter, names in zip("KP", _TERMS, strict=True):
+        if (own := element.child(letter)) is not None:
+            words = own.text.replace(",", " ").split()
+            if len(words) > len(names):
+                raise own.error(phrase("format.count", n=len(words), required=f"at most {len(names)}"))
+            terms |= {name: own.place.number(word) for name, word in zip(names, words, strict=False)}
     skew = element.number("skew", 0.0)
     if any(terms.values()) or skew or sides[0] != sides[1]:
         one_word(element.child("model") or element, "model", str(model), [str(PLAIN), str(AFFINE)])
@@ -211,19 +211,6 @@ def _sides(element: Element, size: Size) -> tuple[float, float]:
     return across, down
 
 
-def _terms(element: Element) -> dict[str, float]:
-    found: dict[str, float] = {}
-    for letter, names in zip("KP", _TERMS, strict=True):
-        own = element.child(letter)
-        if own is None:
-            continue
-        words = own.text.replace(",", " ").split()
-        if len(words) > len(names):
-            raise own.error(phrase("format.count", n=len(words), required=f"at most {len(names)}"))
-        found |= {name: own.place.number(word) for name, word in zip(names, words, strict=False)}
-    return found
-
-
 def _principal_point(
     element: Element,
     size: Size,
@@ -251,11 +238,6 @@ IMAGES, PHOTOS, POSES, CONTROL = "markpts.txt", "images.txt", "stations.txt", "c
 MEASURED, COMPUTED = "-2dpts.txt", "-3dpts.txt"
 _HEADER = "object point id,photo #,"
 _FREE = 10  # Number of lines that are searched for a header
-
-
-def is_folder(path: Path) -> bool:
-    """Return whether a folder contains DBAT tables."""
-    return (path / IMAGES).is_file() and (path / PHOTOS).is_file()
 
 
 def is_measurements(path: Path) -> bool:
@@ -320,6 +302,7 @@ def read_measurements(path: Path, options: ReadOptions) -> DbatBuilder:
 
 
 _EXPORTS = "*-pmexport.txt"
+_Read = Callable[[Path, ReadOptions], DbatBuilder]
 
 
 def _is_script(path: Path) -> bool:
@@ -327,30 +310,28 @@ def _is_script(path: Path) -> bool:
     return root == "document" and "dbat_script_version" in attributes
 
 
-def _the_file(path: Path) -> Path | None:
-    """Return the only script of a folder, else the only export file."""
-    scripts = [each for each in sorted(path.glob("*.xml")) if _is_script(each)]
-    for found in (scripts, sorted(path.glob(_EXPORTS))):
-        if len(found) == 1:
-            return found[0]
-    return None
+def _located(path: Path) -> tuple[Path, _Read | None]:
+    """Return the file with a project, and its reader: the only script or export file of a folder, or it."""
+    if path.is_dir():
+        scripts = [each for each in sorted(path.glob("*.xml")) if _is_script(each)]
+        for files, read in ((scripts, read_script), (sorted(path.glob(_EXPORTS)), read_export)):
+            if len(files) == 1:
+                return files[0], read
+        is_complete = (path / IMAGES).is_file() and (path / PHOTOS).is_file()
+        return path, read_folder if is_complete else None
+    kinds = {_is_script: read_script, is_export: read_export, is_measurements: read_measurements}
+    return path, next((read for is_of, read in kinds.items() if is_of(path)), None)
 
 
 def recognises(path: Path) -> bool:
     """Return whether a path is a script, an export or tables."""
-    if path.is_dir():
-        return is_folder(path) or _the_file(path) is not None
-    return _is_script(path) or is_export(path) or is_measurements(path)
+    return _located(path)[1] is not None
 
 
 def read(path: Path, options: ReadOptions) -> Project:
     """Read an export file or tables of PhotoModeler, a DBAT script or its tables."""
-    if path.is_dir():
-        path = _the_file(path) or path
-    if path.is_dir():
-        take = read_folder
-    elif path.suffix.lower() == ".xml":
-        take = read_script
-    else:
-        take = read_measurements if is_measurements(path) else read_export
+    path, take = _located(path)
+    if take is None:
+        # The error of the reader describes the missing part best.
+        take = read_folder if path.is_dir() else read_script if path.suffix.lower() == ".xml" else read_export
     return take(path, options).dbat_project(options)

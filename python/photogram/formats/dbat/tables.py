@@ -97,18 +97,15 @@ class DbatBuilder(BlockBuilder):
         self.position_sd = self.attitude_sd = held
         if self.free:
             self.cameras = [each.replace(sd=dict.fromkeys(self.free, np.inf)) for each in self.cameras]
-        self.photo_ids = self._names()
-        return self.project(options=self.options).replace(sd_taken=True)
-
-    def _names(self) -> list[str]:
-        """Return unique names of photos: file names, with folders if necessary."""
+        # Unique names: file names, with folders if necessary
         whole = [name.replace("\\", "/").strip() for name in self.paths]
         short = [name.rpartition("/")[2] for name in whole]
-        for names in (short, whole):
-            if all(names) and len(set(names)) == len(names):
-                return names
-        self.messages.append(Message(phrase("dbat.names", names=sorted(set(short)))))
-        return self.photo_ids
+        unique = (names for names in (short, whole) if all(names) and len(set(names)) == len(names))
+        if names := next(unique, None):
+            self.photo_ids = names
+        else:
+            self.messages.append(Message(phrase("dbat.names", names=sorted(set(short)))))
+        return self.project(options=self.options).replace(sd_taken=True)
 
 
 _KNOWN = {
@@ -242,9 +239,6 @@ def is_export(path: Path) -> bool:
     return counts[0] in (2, 4) and all(n >= least for n, least in zip(counts, _HEAD, strict=True))
 
 
-_Take = Callable[[str], Card]  # The next line, by its meaning
-
-
 def read_export(path: Path, options: ReadOptions) -> DbatBuilder:
     """Read an export file, `NAME-pmexport.txt`.
 
@@ -264,13 +258,26 @@ def read_export(path: Path, options: ReadOptions) -> DbatBuilder:
         return takewhile(lambda card: bool(card.words), lines)
 
     take("the title")
-    size = _size(take("tolerance and iterations"))
+    card = take("tolerance and iterations")
+    if len(card.words) < 4:
+        raise card.place.error(phrase("dbat.size"))
+    size = image_size(card.place, _number(card, 2), _number(card, 3))
     take("nine standard deviations")
     default = take("the camera")
     take("standard deviations of the camera")
     cameras = _Cameras(content, default, size)
-    for card in until_empty():
-        _photo(card, take, cameras)
+    for head in until_empty():
+        number = _number(head, 0)
+        if number in content.photo_rows:
+            raise head.place.error(phrase("format.repeated", what="photo", name=str(number)))
+        pose, _, _, camera, _ = (take(f"the {what} of photo {number}") for what in _PHOTO)
+        for card in (pose, camera):
+            if _number(card, 0) != number:
+                raise card.place.error(phrase("dbat.photo", number=number, other=card.words[0]))
+        file = (head.place.text or "").split(None, 1)[1] if len(head.words) > 1 else ""
+        content.numbered_photo(number, file, cameras.name_of(number, camera), head.place)
+        angles = np.radians(pose.numbers(4, "kappa phi omega"))[np.newaxis, ::-1]
+        content.pose(number, pose.numbers(1, "X Y Z"), Attitudes.of("omega_phi_kappa", angles).matrices[0])
     _control(until_empty(), content, options)
     for card in until_empty():
         content.start(_number(card, 0), card.numbers(1, "X Y Z"), card.place)
@@ -285,12 +292,6 @@ def _number(card: Card, index: int) -> int:
     if index >= len(card.words):
         raise card.place.error(phrase("format.end", name="the number of a photo or point"))
     return card.place.whole(card.words[index], highest=2**53)
-
-
-def _size(card: Card) -> Size:
-    if len(card.words) < 4:
-        raise card.place.error(phrase("dbat.size"))
-    return image_size(card.place, _number(card, 2), _number(card, 3))
 
 
 def _sensor(card: Card, first: int, name: str, size: Size) -> tuple[Camera, Size, float]:
@@ -326,20 +327,6 @@ class _Cameras:
             remark = phrase("dbat.other-camera", photo=number, values=" ".join(words))
             self.content.messages.append(Message(remark, card.place.file))
         return self.others[words]
-
-
-def _photo(head: Card, take: _Take, cameras: _Cameras) -> None:
-    number, content = _number(head, 0), cameras.content
-    if number in content.photo_rows:
-        raise head.place.error(phrase("format.repeated", what="photo", name=str(number)))
-    pose, _, _, camera, _ = (take(f"the {what} of photo {number}") for what in _PHOTO)
-    for card in (pose, camera):
-        if _number(card, 0) != number:
-            raise card.place.error(phrase("dbat.photo", number=number, other=card.words[0]))
-    file = (head.place.text or "").split(None, 1)[1] if len(head.words) > 1 else ""
-    content.numbered_photo(number, file, cameras.name_of(number, camera), head.place)
-    angles = np.radians(pose.numbers(4, "kappa phi omega"))[np.newaxis, ::-1]
-    content.pose(number, pose.numbers(1, "X Y Z"), Attitudes.of("omega_phi_kappa", angles).matrices[0])
 
 
 def _control(cards: Iterable[Card], content: DbatBuilder, options: ReadOptions) -> None:

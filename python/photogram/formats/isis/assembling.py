@@ -16,7 +16,7 @@ from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.format import FORMATS
 from photogram.formats.isis.network import ControlNetwork, read_network
 from photogram.formats.isis.outcome import DETAILS, PITCHES, Image, PlanetaryContents, rows_of_each
-from photogram.formats.isis.solving import Settings, observations_of, one_flight, read_settings, solving
+from photogram.formats.isis.solving import Settings, observation_number, one_flight, read_settings, solving
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.io.places import Place
@@ -101,7 +101,17 @@ def read(path: Path, options: ReadOptions) -> Project:
     contents = PlanetaryContents(network, path, photos, settings, starts)
     unused = [serial for serial in files if serial not in {each.serial for each in images}]
     remarks = [Message(remark, each.path) for each in images for remark in each.supported.isd.remarks]
-    return _project(contents, seen, [*_left_out(network, unused, options.cubes), *remarks])
+    measures, points = network.measures, network.points
+    again = (measures.rejected | points.rejected[network.point_of_measure]) & ~measures.ignore
+    counts = {
+        "isis.ignored-points": points.ignore.sum(),
+        "isis.ignored-measures": network.is_ignored.sum(),
+        "isis.rejected-measures": again.sum(),
+    }
+    left = [Message.of(code, n=int(n)) for code, n in counts.items() if n]
+    if unused:
+        left.append(Message(phrase("isis.unused", n=len(unused), names=unused), options.cubes))
+    return _project(contents, seen, [*left, *remarks])
 
 
 def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings, cubes: Path) -> list[Image]:
@@ -111,9 +121,20 @@ def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings,
     for serial in seen:
         if serial not in files:
             raise InputError(phrase("isis.image", name=serial), file=cubes)
-    held, there, found = _held(settings, files), set(seen), {}
+    held, there, found = set[str](), set(seen), {}
+    named = {str(file.resolve()): serial for serial, file in files.items()} if settings.held else {}
+    # HELDLIST is a list of serial numbers or files.
+    for place in filled_lines(settings.held) if settings.held else ():
+        text = (place.text or "").strip()
+        file = str((place.file or Path()).parent.joinpath(text).resolve())
+        if (serial := text if text in files else named.get(file)) is None:
+            raise place.error(phrase("isis.held"))
+        held.add(serial)
     # The first image of an observation is the first one in the list.
-    observations = observations_of([each for each in files if each in there], shared=settings.observations)
+    observations: dict[str, list[str]] = {}
+    for serial in (each for each in files if each in there):
+        number = observation_number(serial) if settings.observations else serial
+        observations.setdefault(number, []).append(serial)
     for number, serials in observations.items():
         known = {serial in held for serial in serials}
         if len(known) > 1:
@@ -124,21 +145,6 @@ def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings,
             supported = SupportedImage(isd, serial, "isis", "isis", own.trajectory)
             found[serial] = Image(serial, files[serial], supported, own)
     return [found[serial] for serial in seen]
-
-
-def _held(settings: Settings, files: dict[str, Path]) -> set[str]:
-    """Return serial numbers of images in HELDLIST, a list of numbers or files."""
-    if settings.held is None:
-        return set()
-    names = {str(file.resolve()): serial for serial, file in files.items()}
-    found = set()
-    for place in filled_lines(settings.held):
-        text = (place.text or "").strip()
-        serial = text if text in files else names.get(str((settings.held.parent / text).resolve()))
-        if serial is None:
-            raise place.error(phrase("isis.held"))
-        found.add(serial)
-    return found
 
 
 class _Seen(NamedTuple):
@@ -153,7 +159,6 @@ class _Seen(NamedTuple):
 
 
 def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
-    """Return the measures of all images."""
     rows, own = np.flatnonzero(~network.is_ignored), network.measures
     if not len(rows):
         raise InputError(phrase("format.missing", what="measures that are not ignored"), file=path)
@@ -237,18 +242,3 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
     return block.project(
         details=details, title=contents.network.network_id or "", timed=timed, spheroid=spheroid
     )
-
-
-def _left_out(network: ControlNetwork, unused: list[str], cubes: Path) -> list[Message]:
-    """Return remarks on ignored, unused and reinstated measures."""
-    measures, points = network.measures, network.points
-    again = (measures.rejected | points.rejected[network.point_of_measure]) & ~measures.ignore
-    counts = {
-        "isis.ignored-points": points.ignore.sum(),
-        "isis.ignored-measures": network.is_ignored.sum(),
-        "isis.rejected-measures": again.sum(),
-    }
-    found = [Message.of(code, n=int(n)) for code, n in counts.items() if n]
-    if unused:
-        found.append(Message(phrase("isis.unused", n=len(unused), names=unused), cubes))
-    return found

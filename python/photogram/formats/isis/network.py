@@ -14,25 +14,12 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io.files import read_bytes, reading
-from photogram.io.pvl import Group, Quantity, Value, parsed
+from photogram.io.pvl import Group, Quantity, parsed
 from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.words import phrase
 
 POINT_TYPES = ("Tie", "Ground", "Free", "Constrained", "Fixed")
 """Meaning of point types; old networks have `Tie` and `Ground` for `Free` and `Fixed`."""
-SOURCES = (
-    "None",
-    "User",
-    "AverageOfMeasures",
-    "Reference",
-    "Ellipsoid",
-    "DEM",
-    "Basemap",
-    "BundleSolution",
-)
-"""Meaning of sources of a-priori coordinates and radii."""
-MEASURE_TYPES = ("Candidate", "Manual", "RegisteredPixel", "RegisteredSubPixel")
-"""Meaning of measure types."""
 
 HEADER = {
     "NetworkId": "network_id",
@@ -132,7 +119,8 @@ class ControlPoints(_Columns):
     ignore: Bools = _column(np.bool_)
     rejected: Bools = _column(np.bool_)
     reference: _Indices = _column(np.int32)  # (n,) reference measure of the point, from its first measure
-    # (n,) index into `SOURCES`: origin of the a-priori coordinates, and of the radius
+    # (n,) origin of the a-priori coordinates, and of the radius: 0 none, 1 user, 2 average of measures,
+    # 3 reference, 4 ellipsoid, 5 DEM, 6 basemap, 7 bundle solution
     apriori_source: _Codes = _column(np.int8)
     apriori_radius_source: _Codes = _column(np.int8)
     apriori: Floats = _column(
@@ -171,7 +159,7 @@ class ControlMeasures(_Columns):
 
     serials: Sequence[str]  # Serial numbers of images, each once
     serial: _Indices  # (m,) index of the image in `serials`
-    types: _Codes = _column(np.int8)  # (m,) index into `MEASURE_TYPES`
+    types: _Codes = _column(np.int8)  # (m,) 0 candidate, 1 manual, 2 registered to a pixel, 3 to a part of it
     sample: Floats = _column(np.float64)
     line: Floats = _column(np.float64)
     apriori_sample: Floats = _column(np.float64)
@@ -383,17 +371,14 @@ def _text(data: bytes, path: Path) -> ControlNetwork:
                 raise InputError(phrase("format.text", name=key, value=value), file=path, record=network.line)
             header[name] = value
         elif key.lower() == "targetradii":
-            header["radii"] = _radii(value, network, path)
+            own, unit = value if isinstance(value, Quantity) else (value, "meters")
+            try:
+                radii = np.array(own if isinstance(own, list) else [own], dtype=float)
+            except (TypeError, ValueError):
+                radii = np.array(np.nan)
+            if unit.lower() != "meters" or radii.ndim != 1 or not np.isfinite(radii).all():
+                message = phrase("isis.radii", value=str(value))
+                raise InputError(message, file=path, record=network.line)
+            header["radii"] = radii
     others = _others({*_HEADER, "targetradii", "version"}, label, network)
     return ControlNetwork.of(columns, **header, version=version, others=others)
-
-
-def _radii(value: Value, network: Group, path: Path) -> Floats:
-    own, unit = value if isinstance(value, Quantity) else (value, "meters")
-    try:
-        radii = np.array(own if isinstance(own, list) else [own], dtype=float)
-    except (TypeError, ValueError):
-        radii = np.array(np.nan)
-    if unit.lower() != "meters" or radii.ndim != 1 or not np.isfinite(radii).all():
-        raise InputError(phrase("isis.radii", value=str(value)), file=path, record=network.line)
-    return radii

@@ -142,14 +142,6 @@ def observation_number(serial: str) -> str:
     return serial if count is None else "/".join(serial.split("/")[:count])
 
 
-def observations_of(serials: Sequence[str], *, shared: bool) -> dict[str, list[str]]:
-    """Return the images of each observation by number."""
-    found: dict[str, list[str]] = {}
-    for serial in serials:
-        found.setdefault(observation_number(serial) if shared else serial, []).append(serial)
-    return found
-
-
 def one_flight(isds: Sequence[Isd]) -> Isd:
     """Return the first support data with the tables of all, which must agree."""
     first, *others = isds
@@ -337,8 +329,12 @@ def read_settings(text: str) -> Settings:
                     three = dict(zip(own.names, given.get(own.field, _FREE), strict=True))
                     found = tuple((three | {name: found}).values())
                 given[own.field] = found
-            else:
-                remarks |= _elsewhere(name, value)
+            elif name in OTHERWISE:
+                remarks[name] = phrase("error.at", what=name, message=phrase(f"isis.{OTHERWISE[name]}"))
+            elif name not in REFUSED:
+                raise InputError(unknown_name("setting of jigsaw", name, [*PARAMETERS, *OTHERWISE, *REFUSED]))
+            elif value.lower() not in FALSE:
+                raise InputError(phrase("isis.refused", name=name))
         except InputError as error:
             raise InputError(
                 phrase("error.at", what=f"{name}={value}", message=message_of(error)), **where
@@ -364,15 +360,3 @@ def _words(text: str) -> Iterator[tuple[str, str, dict[str, Any]]]:
                     continue
                 raise InputError(phrase("isis.syntax", value=word), **where)
             yield name.upper(), value, where
-
-
-def _elsewhere(name: str, value: str) -> dict[str, Phrase]:
-    """Return a remark on a replaced setting; none for a setting without effect."""
-    if name in OTHERWISE:
-        return {name: phrase("error.at", what=name, message=phrase(f"isis.{OTHERWISE[name]}"))}
-    if name not in REFUSED:
-        known = [*PARAMETERS, *OTHERWISE, *REFUSED]
-        raise InputError(unknown_name("setting of jigsaw", name, known))
-    if value.lower() not in FALSE:
-        raise InputError(phrase("isis.refused", name=name))
-    return {}

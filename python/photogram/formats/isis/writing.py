@@ -22,7 +22,6 @@ from photogram.formats.csm.isd import (
 )
 from photogram.formats.csm.photos import SupportedImage, to_camera, trajectory_of
 from photogram.formats.csm.reading import UNITS, isd_of
-from photogram.formats.isis.jigsaw_files import jigsaw_files
 from photogram.formats.isis.network import (
     HEADER,
     LABEL_BYTES,
@@ -30,7 +29,7 @@ from photogram.formats.isis.network import (
     ControlNetwork,
     is_binary,
 )
-from photogram.formats.isis.outcome import Image, Outcome, contents_of
+from photogram.formats.isis.outcome import Image, Outcome, contents_of, jigsaw_files
 from photogram.formats.project import Project
 from photogram.io.json import read_json
 from photogram.io.pvl import Group, Value, label_text

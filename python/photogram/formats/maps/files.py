@@ -14,15 +14,13 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.crs_results import Placed
 from photogram.formats.maps.layers import LAYERS, DrawnLayer, Layer, chosen_crs, map_layers
+from photogram.formats.results import Placed
 from photogram.network.rays import local_axes
 from photogram.results.footprints import metric_covariances
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
 from photogram.words import Phrase, phrase
-
-__all__ = ["check_map", "map_files", "point_cloud"]
 
 GEOPACKAGE, GEOJSON = ".gpkg", (".geojson", ".json")
 WGS84 = "EPSG:4979"  # System of GeoJSON (RFC 7946): longitude, latitude, height above the ellipsoid

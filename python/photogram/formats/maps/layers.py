@@ -11,12 +11,11 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
-from photogram.formats.crs_results import Placed, placed
 from photogram.formats.declarations import declared
 from photogram.formats.project import frame_of
+from photogram.formats.results import Placed, placed
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.geometry import geocentric_to_geographic
-from photogram.network.moving_photos import Moment
 from photogram.results.footprints import footprints
 from photogram.results.result import Result
 from photogram.results.tables import ComponentTests, Tests
@@ -26,8 +25,6 @@ from photogram.statistics.limits import normal_limit
 
 if TYPE_CHECKING:
     import geopandas
-
-__all__ = ["Layer", "chosen_crs", "map_layers"]
 
 CONFIDENCE = 0.95  # Default probability of an ellipse
 MOST_ELLIPSES = 20_000  # Default limit of error ellipses of points
@@ -154,13 +151,21 @@ def map_layers(
             one = found.moved(found.points[:1], np.ones((1, 3))) - found.points[:1]
             spacing = spacing / one[:, :2]
         scale = fitting_scale(own, spacing)
+    control, tests = _given(found, found.control_differences()), np.abs(result.control.standardized)
     parts: dict[str, _Part] = {
         "photos": _photos(found),
         "footprints": _footprints(found, sizes),
         "points": _points(found),
         "point_ellipses": _ellipses(found, drawn, confidence, scale),
-        "control": _control(found),
-        "control_residuals": _vectors(found, *_given(found, found.control_differences()), scale),
+        "control": (
+            control[1],
+            {
+                "point": _ids(found)[control[0]],
+                **_along("d", control[2]),
+                "largest_test": np.where(np.isnan(tests), 0.0, tests).max(axis=1, initial=0.0),
+            },
+        ),
+        "control_residuals": _vectors(found, *control, scale),
         "check_residuals": _vectors(found, *_given(found, found.differences()), scale),
         "suspicious": _suspicious(found),
     }
@@ -265,16 +270,6 @@ def _given(found: Placed, differences: tuple[Indices, Floats]) -> tuple[Indices,
     return rows, found.moved(adjusted, -steps), steps
 
 
-def _control(found: Placed) -> _Part:
-    rows, given, steps = _given(found, found.control_differences())
-    tests = np.abs(found.result.control.standardized)
-    return given, {
-        "point": _ids(found)[rows],
-        **_along("d", steps),
-        "largest_test": np.where(np.isnan(tests), 0.0, tests).max(axis=1, initial=0.0),
-    }
-
-
 def _vectors(found: Placed, rows: Indices, given: Floats, steps: Floats, scale: float) -> _Part:
     ends = found.moved(given, scale * steps)
     return np.stack([given, ends], axis=1), {
@@ -326,19 +321,14 @@ def _large_tests(found: Placed, types: Sequence[ComponentTests]) -> Iterator[tup
             if point is not None:
                 yield places[point_rows[point]], own
             elif moment is not None:
-                yield _flown(found, moment), own
+                # The adjusted trajectory at a time.
+                flown = found.result.trajectories[moment.trajectory.name]
+                at, *_ = flown.given.flown(np.array([moment.time]), flown.position, flown.rotation)
+                if block.spheroid is not None:
+                    at = geocentric_to_geographic(at, block.spheroid)
+                yield np.asarray(found.carried(at)[0]), own
             elif photo is not None:
                 yield found.photos[photo_rows[photo]], own
-
-
-def _flown(found: Placed, moment: Moment) -> Floats:
-    """Return the position on the map of an adjusted trajectory at a time."""
-    result, spheroid = found.result, found.result.block.spheroid
-    own = result.trajectories[moment.trajectory.name]
-    places, *_ = own.given.flown(np.array([moment.time]), own.position, own.rotation)
-    if spheroid is not None:
-        places = geocentric_to_geographic(places, spheroid)
-    return np.asarray(found.carried(places)[0])
 
 
 _SUSPECT = ("what", "photo", "point", "x", "y", "residual", "unit", "test")

@@ -28,11 +28,12 @@ from photogram.formats.models import carried, is_free
 from photogram.formats.plain.schema import AXES, deviation_columns
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import covariances_of
-from photogram.formats.project import Frame, Project
+from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
+from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Position
 from photogram.network.similarity import similarity
@@ -313,7 +314,15 @@ def located(
     if option == GNSS_CRS and crs is None and not any(each.crs for each in said):
         systems = [""] * len(said)
     else:
-        systems = _systems(said, crs, option)
+        from photogram.formats.crs import is_on
+
+        named = [each for each in said if each.crs and each.heights]
+        if crs is not None and named and not is_on(crs, _WGS84):
+            raise named[0].place.error(phrase("photos.wgs84", crs=crs, option=option))
+        for each in said:
+            if not each.crs and crs is None:
+                raise each.place.error(phrase("photos.crs", option=option))
+        systems = [each.crs if each.crs and not each.heights else crs or "" for each in said]
         _check_heights(known, said, systems, option)
     default = np.broadcast_to(np.nan if sd is None else np.asarray(sd, dtype=float), 3)
     deviations = [each.deviations.sd if each.deviations is not None else default for each in known]
@@ -323,19 +332,6 @@ def located(
         np.array([each.position for each in said], dtype=float).reshape(-1, 3),
         np.array(deviations, dtype=float).reshape(-1, 3),
     )
-
-
-def _systems(said: Sequence[Said], crs: str | None, option: str) -> list[str]:
-    """Return the system of each position: its own, else `crs`, else empty."""
-    from photogram.formats.crs import is_on
-
-    if crs is not None and any(each.crs and each.heights for each in said) and not is_on(crs, _WGS84):
-        first = next(each for each in said if each.crs and each.heights)
-        raise first.place.error(phrase("photos.wgs84", crs=crs, option=option))
-    for each in said:
-        if not each.crs and crs is None:
-            raise each.place.error(phrase("photos.crs", option=option))
-    return [each.crs if each.crs and not each.heights else crs or "" for each in said]
 
 
 def _check_heights(

@@ -272,11 +272,9 @@ def counts(sources: Iterable[Said | None]) -> dict[str, int]:
 
 def told(sources: Mapping[str, int]) -> str:
     """Format counts of sources: 118 of .MRK, 2 of XMP, 1 without."""
-    rest = [f"{sources[WITHOUT]} {WITHOUT}"] if WITHOUT in sources else []
-    return (
-        ", ".join([f"{count} of {name}" for name, count in sources.items() if name != WITHOUT] + rest)
-        or "none"
-    )
+    counts = [f"{count} of {name}" for name, count in sources.items() if name != WITHOUT]
+    counts += [f"{sources[WITHOUT]} {WITHOUT}"] if WITHOUT in sources else []
+    return ", ".join(counts) or "none"
 
 
 def read_metadata(directory: str | os.PathLike[str], *, mrk_antenna: bool = False) -> Metadata:

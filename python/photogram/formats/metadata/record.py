@@ -17,7 +17,6 @@ from photogram.formats.column_words import column_of
 from photogram.formats.columns import PLAIN, is_geographic, is_photo, settled
 from photogram.formats.control import system_of
 from photogram.formats.plain.schema import AXES, TABLES, column_units, deviation_columns
-from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns, read_rows
 from photogram.io.files import read_lines
 from photogram.io.numbers import finite_number
@@ -36,7 +35,8 @@ UNSAID_SYSTEM = "EPSG:4326"  # Longitude and latitude of WGS 84, heights of unkn
 UNSAID, SEA_LEVEL = "unsaid", "above sea level"
 """Heights whose reference is unknown; and heights above sea level with an unknown geoid."""
 
-FIXED = "fixed"
+FIXED, _FIXES = "fixed", {34: "float", 16: "single", 0: "none"}
+"""Meanings of the flags of DJI (`RtkFlag` of XMP, `Q` of .MRK) from 50 to 59, and of others."""
 HIGHEST = 1e5  # Largest height or standard deviation, metres
 LEAST = 1e-6  # Smallest standard deviation, metres
 
@@ -85,21 +85,14 @@ class Said:
     @property
     def fix(self) -> str:
         """Meaning of the flag."""
-        return fix_of(self.flag) if self.rtk or self.flag is not None else ""
+        if self.flag is None:
+            return "unknown" if self.rtk else ""
+        return FIXED if 50 <= self.flag <= 59 else _FIXES.get(self.flag, "unknown")
 
     @property
     def is_located(self) -> bool:
         """Whether there is a position with a height."""
         return self.position is not None and not math.isnan(self.position[2])
-
-
-def fix_of(flag: int | None) -> str:
-    """Return the meaning of a DJI flag (`RtkFlag` of XMP, `Q` of .MRK)."""
-    if flag is None:
-        return "unknown"
-    if 50 <= flag <= 59:
-        return FIXED
-    return {34: "float", 16: "single", 0: "none"}.get(flag, "unknown")
 
 
 def usable_deviations(east: float, north: float, height: float) -> Triple | None:
@@ -149,18 +142,15 @@ def read_exposures(path: Path, *, antenna: bool) -> dict[int, Said]:
     camera. If `antenna`, it is the position of the antenna.
     """
     found: dict[int, Said] = {}
-    for record, line in enumerate(read_lines(path), 1):
-        if line.strip():
-            place = Place(path, record, line)
-            number, said = _exposure(place, antenna)
-            if number in found:
-                raise place.error(phrase("format.repeated", what="exposure", name=str(number)))
-            found[number] = said
+    for place in filled_lines(path):
+        number, said = _exposure(place, antenna)
+        if number in found:
+            raise place.error(phrase("format.repeated", what="exposure", name=str(number)))
+        found[number] = said
     return found
 
 
 def _exposure(place: Place, antenna: bool) -> tuple[int, Said]:
-    """Return number and metadata of an exposure."""
     cells = [each.strip() for each in (place.text or "").split("\t")]
     if len(cells) < 11:
         raise place.error(phrase("format.words", n=len(cells), required="11 words between tabs"))
@@ -191,10 +181,8 @@ def _exposure(place: Place, antenna: bool) -> tuple[int, Said]:
             height - down,
         )
     sd = usable_deviations(east, north, up) if flag else None
-    rtk = fix_of(flag) != "none"
-    return place.whole(number, "number", highest=10**6), Said(
-        ".MRK", place, ELLIPSOIDAL, "", position, sd, rtk, flag
-    )
+    said = Said(".MRK", place, ELLIPSOIDAL, "", position, sd, rtk=flag != 0, flag=flag)
+    return place.whole(number, "number", highest=10**6), said
 
 
 SOURCE = "RTKLIB"
@@ -374,7 +362,16 @@ def read_reference(path: Path, messages: list[Message]) -> dict[str, Said]:
     """
     head = list(islice(read_lines(path), HEAD))
     crs = next((match[1].strip() for line in head if (match := _SYSTEM.match(line.strip()))), "")
-    table, angular = _table(path, head, messages)
+    rows = [line for line in head if _is_row(line)]
+    if rows and not any(_header(line) for line in head):
+        first = [finite_number(each) for each in _cells(rows[0])[1:]]
+        angular = abs(first[0]) <= 90 and abs(first[1]) <= 180
+        axes = ("y", "x", "z") if angular else AXES
+        table = read_rows(path, ("photo", *axes, *_PIX4D[len(first)]), numbers=(*_NUMBERS, "sd_xy"))
+    else:
+        table = read_columns(path, known=_KNOWN, numbers=_NUMBERS, spelling=partial(PLAIN.spelled, _KNOWN))
+        angular = is_geographic(table)
+    table = settled(table, PLAIN, _KNOWN, column_units("gnss"), _REQUIRED, (), REFERENCE, messages)
     unsaid = angular and not crs
     used, xyz = table.flags("enabled"), table.vectors(AXES)
     common, sd = (table.vectors(names, infinite=True) for names in (("sd",), deviation_columns(AXES)))
@@ -395,22 +392,6 @@ def read_reference(path: Path, messages: list[Message]) -> dict[str, Said]:
                 sd=usable_deviations(*sd[row].tolist()),
             )
     return found
-
-
-def _table(path: Path, head: Sequence[str], messages: list[Message]) -> tuple[ColumnTable, bool]:
-    """Return the table in internal units, and whether it is geographic."""
-    rows = [line for line in head if _is_row(line)]
-    plain = bool(rows) and not any(_header(line) for line in head)
-    angular = False
-    if plain:
-        numbers = [finite_number(each) for each in _cells(rows[0])[1:]]
-        angular = abs(numbers[0]) <= 90 and abs(numbers[1]) <= 180
-        axes = ("y", "x", "z") if angular else AXES
-        table = read_rows(path, ("photo", *axes, *_PIX4D[len(numbers)]), numbers=(*_NUMBERS, "sd_xy"))
-    else:
-        table = read_columns(path, known=_KNOWN, numbers=_NUMBERS, spelling=partial(PLAIN.spelled, _KNOWN))
-        angular = is_geographic(table)
-    return settled(table, PLAIN, _KNOWN, column_units("gnss"), _REQUIRED, (), REFERENCE, messages), angular
 
 
 def read_geo_txt(path: Path) -> dict[str, Said]:

@@ -61,12 +61,3 @@ def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | No
             cells |= columns_of(deviation_columns(BENDS), bends[name].deviations[:2])
         rows.append(cells)
     return columns_of_records(rows)
-
-
-def levels(image_sd: np.ndarray, *, assumed: bool) -> np.ndarray | None:
-    """Return (m,) levels l of standard deviations 2^l; None if given."""
-    if not assumed:
-        return None
-    found = np.log2(image_sd[:, 0])
-    whole = np.round(found)
-    return whole if np.array_equal(2.0**whole, image_sd[:, 0]) else None

@@ -140,11 +140,9 @@ def read_cameras(tables: Tables) -> Cameras:
         own = _Row(tables, table, row, cells, is_correlated)
         parts, converted = own.divisor()
         in_mm += [own.name] * converted
-        certificate = own.certificate(certificates)
-        if certificate is None:
-            camera = made(table, row, own.camera, parts)
-        else:
-            camera = made(table, row, certified, tables, own.name, own.model, certificate)
+        with at_place(table.at(row)):
+            certificate = own.certificate(certificates)
+            camera = certified(tables, own.name, own.model, certificate) if certificate else own.camera(parts)
         further = cells.get("pixel_mm"), cells.get("for_each", "all"), "weights" in cells
         rows.append(TableCamera(camera, own.size, *further, own.line, own.shutter(camera)))
     if both := [name for name in in_mm if covariances.names("camera", name)]:
@@ -216,9 +214,8 @@ class _Row:
             edges = own[:, _counted(direction)]
         if np.isnan(edges).any():
             raise table.error(row, phrase("plain.picture-edges"))
-        title, sd = cells.get("shutter", camera.name), cells.get("sd_readout", 0.0)
-        shared, value = self.tables.shared, cells["readout"]
-        readout = shared.one(table, row, "shutter", Readout, title, value=value, sd=sd)
+        title, sd, value = cells.get("shutter", camera.name), cells.get("sd_readout", 0.0), cells["readout"]
+        readout = self.tables.unknown(table, row, "shutter", Readout, title, value=value, sd=sd)
         return made(table, row, Shutter, readout, tuple(edges.tolist()), direction)
 
     def divisor(self) -> tuple[float, bool]:

@@ -31,7 +31,6 @@ from photogram.formats.plain.photos import Images, Photos
 from photogram.formats.plain.scanners import (
     Machine,
     film_cells,
-    known_words,
     machines_of,
     read_films,
     read_scanners,
@@ -155,7 +154,16 @@ class _Reader:
     def read(self, found: Scanned) -> None:
         """Add the scans and observations of all photos to the result."""
         self._place_films()
-        self._tell_beyond()
+        cameras = {each.name: each for each in self.cameras.cameras}
+        for camera, certificate in self.cameras.certificates.items():
+            places, sd = [np.zeros(0, dtype=complex)], [np.zeros(0)]
+            for photo in self.photos:
+                if photo.camera == camera and len(photo.marks) > 1:
+                    places.append(Lying(photo.places, photo.mirrored).back(photo.true, photo.true_images))
+                    sd.append(photo.machine.readings.pitch * photo.image_sd)
+            beyond = beyond_message(cameras[camera], certificate, np.concatenate(places), np.concatenate(sd))
+            if beyond:
+                self.tables.messages.append(Message(beyond, certificate.file))
         starts = [self._start(photo) for photo in self.photos]
         for photo, start in zip(self.photos, starts, strict=True):
             film = self._film(photo, start)
@@ -178,19 +186,6 @@ class _Reader:
             found.observations.extend(own.known(self.tables, read, self.covariances))
         machines = {id(each.machine): each.machine for each in self.photos}
         found.observations.extend(each.known for each in machines.values() if each.known is not None)
-
-    def _tell_beyond(self) -> None:
-        """Report images beyond the distortion table of the certificate of their camera."""
-        cameras = {each.name: each for each in self.cameras.cameras}
-        for camera, own in self.cameras.certificates.items():
-            places, sd = [np.zeros(0, dtype=complex)], [np.zeros(0)]
-            for photo in self.photos:
-                if photo.camera == camera and len(photo.marks) > 1:
-                    places.append(Lying(photo.places, photo.mirrored).back(photo.true, photo.true_images))
-                    sd.append(photo.machine.readings.pitch * photo.image_sd)
-            message = beyond_message(cameras[camera], own, np.concatenate(places), np.concatenate(sd))
-            if message:
-                self.tables.messages.append(Message(message, own.file))
 
     def _place_films(self) -> None:
         """Find the side of each photo, and initial values of t1, t2 and theta, from table and marks."""
@@ -362,10 +357,17 @@ class WrittenFilms:
             | columns_of(deviation_columns(names), np.sqrt(np.diag(each.precision)))
             for each in self.readings
         )
+        films: dict[str, dict[str, Any]] = {}  # One row for all photos of a roll
+        for photo, film in self.films.items():
+            cells = {"film": "film"} | film_cells(film, self._rolls[photo], self._sizes(photo))
+            row = films.setdefault(cells["film"], cells)
+            if any(None not in (row.get(key), cell) and row.get(key) != cell for key, cell in cells.items()):
+                raise InputError(phrase("plain.film-differs", film=cells["film"], photo=photo))
+            row |= {key: cell for key, cell in cells.items() if row.get(key) is None}
         rows = {
             "fiducials": (row for own in self.certificates.values() for row in own.rows()),
             "fiducial_images": readings,
-            "films": self._film_rows().values(),
+            "films": films.values(),
             "scanners": map(scanner_cells, self.machines.values()),
         }
         found = {name: columns_of_records(own) for name, own in rows.items()}
@@ -373,16 +375,14 @@ class WrittenFilms:
 
     def photo_columns(self) -> dict[str, Any]:
         """Return the columns of photos; empty without films."""
-        return columns_of_records(map(self._photo, self.photos))
-
-    def _photo(self, photo: str) -> dict[str, Any]:
-        if (film := self.films.get(photo)) is None:
-            return {}
-        known, roll, start = self.known.get(photo), self._rolls[photo], film.placement.position
-        if known is not None and known.covariance is not None:
-            start = np.asarray(known.values, dtype=float)[:3]
-        cells = {"film": "film" if roll is None else roll.name, "scanner": film.scanner.name}
-        return {**cells, "mirrored": film.mirrored, **columns_of(_START, start)}
+        rows: dict[str, dict[str, Any]] = {photo: {} for photo in self.photos}
+        for photo, film in self.films.items():
+            known, roll, start = self.known.get(photo), self._rolls[photo], film.placement.position
+            if known is not None and known.covariance is not None:
+                start = np.asarray(known.values, dtype=float)[:3]
+            rows[photo] = {"film": "film" if roll is None else roll.name, "scanner": film.scanner.name}
+            rows[photo] |= {"mirrored": film.mirrored, **columns_of(_START, start)}
+        return columns_of_records(rows.values())
 
     def covariances(self) -> list[tuple[str, str, Sequence[str], Floats]]:
         """Return type, name, components and matrix of joint priors."""
@@ -393,22 +393,11 @@ class WrittenFilms:
         ]
         for name, own in self.machines.items():
             if own.known is not None:
-                found.append(("scanner", name, known_words(own), own.known.precision))
+                found.append(("scanner", name, own.words(own.known.joined), own.known.precision))
         for camera, marks in self.certificates.items():
             if marks.covariance is not None:
                 found.append(("fiducials", camera, marks.words, marks.covariance))
         return found
-
-    def _film_rows(self) -> dict[str, dict[str, Any]]:
-        """Return one row for all photos of a roll, by its name."""
-        rows: dict[str, dict[str, Any]] = {}
-        for photo, film in self.films.items():
-            own = {"film": "film"} | film_cells(film, self._rolls[photo], self._sizes(photo))
-            row = rows.setdefault(own["film"], own)
-            if any(None not in (row.get(key), value) and row.get(key) != value for key, value in own.items()):
-                raise InputError(phrase("plain.film-differs", film=own["film"], photo=photo))
-            row |= {key: value for key, value in own.items() if row.get(key) is None}
-        return rows
 
     def _sizes(self, photo: str) -> Mapping[str, float | None]:
         """Return standard deviations of m, b1, b2; None with covariances."""

@@ -292,7 +292,6 @@ def _named_groups(own: Sequence[Any], groups: dict[int, str]) -> dict[str, dict[
 
 
 def _written(block: Block, name: str, own: Sequence[Any], groups: Mapping[int, str]) -> dict[str, Any]:
-    """Return the columns of observations."""
     found: dict[str, Any] = {}
     for part in TABLES[name].parts:
         if isinstance(part, Parameter):
@@ -317,7 +316,6 @@ def _written(block: Block, name: str, own: Sequence[Any], groups: Mapping[int, s
 
 
 def _subject_columns(own: Sequence[Any], block: Block) -> dict[str, Any]:
-    """Return the columns of the subjects of observations."""
     trajectories, photos = [each.trajectory for each in own], [each.photo for each in own]
     if not any(trajectories):
         # If photos have times, the times of drifts are written in addition.
@@ -331,7 +329,6 @@ def _subject_columns(own: Sequence[Any], block: Block) -> dict[str, Any]:
 
 
 def _deviations(own: Sequence[Any], column: Column) -> dict[str, Any]:
-    """Return the columns of standard deviations and covariances."""
     if not column.components:
         return {"sd": np.array([each.sd for each in own], dtype=float)}
     covariances = np.array([each.precision for each in own])

@@ -15,11 +15,10 @@ import numpy as np
 
 from photogram.arguments.arrays import repeated_pairs
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.formats.images import from_tables, in_unit
+from photogram.formats.images import by_camera, from_tables, in_unit
 from photogram.formats.plain.cameras import Cameras
 from photogram.formats.plain.schema import ANGLES, AXES, ROTATIONS, SD_AXES, deviation_columns
-from photogram.formats.plain.settings import Settings
-from photogram.formats.plain.tables import Tables, Transform, indices_of, made_of_rows
+from photogram.formats.plain.tables import Tables, Transform, check_rows, indices_of, made_of_rows
 from photogram.io.column_table import ColumnTable
 from photogram.io.numbers import scaled
 from photogram.lazy_dataclasses import dataclass, replace
@@ -120,8 +119,7 @@ def _attitude_weights(
         row = int(np.argwhere(sd < 0)[0][0])
         raise table.error(row, phrase("plain.negative-angle-sd", value=float(sd[row].min())))
     unknown = np.isfinite(sd).any(axis=1) & np.isnan(matrices).any(axis=(1, 2))
-    if unknown.any():
-        raise table.error(int(np.flatnonzero(unknown)[0]), phrase("plain.no-angles"))
+    check_rows(table, unknown, phrase("plain.no-angles"))
     plain = settings.attitude == "omega_phi_kappa" and settings.photo == "y_up"
     if plain and columns is own:
         return sd, {}
@@ -216,33 +214,37 @@ def _image_sd(tables: Tables, table: ColumnTable, *, given: bool) -> Floats | No
     return found
 
 
-def image_coordinates(
-    settings: Settings, images: Images, cameras: Cameras, photo_cameras: Indices, scanned: Bools
-) -> tuple[Floats, Floats | None]:
-    """Return image coordinates and standard deviations of the cameras.
+@dataclass(frozen=True)
+class ImageSource:
+    """The table of images of a project, and what its conversion requires."""
 
-    Line scanners have samples and lines, with standard deviations in the unit of images. Readings of scanned
-    films are unchanged.
-    """
-    sd = images.sd if images.sd is None or settings.image != "um" else scaled(images.sd, 1e-3)
-    pixels = settings.image == "px" and settings.image_y == "down"
-    plain = in_unit(settings, images.xy, pixels=pixels)
+    tables: Tables
+    photos: Photos
+    cameras: Cameras
+    of_photos: Indices  # Rows of the cameras of photos
+    scanned: Bools  # Whether photos are scanned
 
-    def converted(row: int, measured: Floats, own: Floats) -> Floats:
-        if cameras.rows[row].line is not None:
-            return in_unit(settings, measured, pixels=True)
-        return from_tables(settings, *cameras.rows[row][:2], own)
+    def converted(self, images: Images) -> tuple[Floats, Floats | None]:
+        """Return image coordinates and standard deviations of the cameras.
 
-    if len(cameras.rows) == 1 and not scanned.any():
-        return converted(0, images.xy, plain), sd
-    found = plain.copy()
-    of_images = photo_cameras[images.photos]
-    for row in range(len(cameras.rows)):
-        own = of_images == row
-        found[own] = converted(row, images.xy[own], plain[own])
-    own = scanned[images.photos]
-    found[own] = scaled(images.xy[own], 1e-3 if settings.image == "um" else 1.0)
-    return found, sd
+        Line scanners have samples and lines, with standard deviations in the unit of images. Readings of
+        scanned films are unchanged.
+        """
+        settings, cameras = self.tables.settings, self.cameras.rows
+        sd = images.sd if images.sd is None or settings.image != "um" else scaled(images.sd, 1e-3)
+        pixels = settings.image == "px" and settings.image_y == "down"
+
+        def convert(row: int, xy: Floats) -> Floats:
+            if cameras[row].line is not None:
+                return in_unit(settings, xy, pixels=True)
+            return from_tables(settings, *cameras[row][:2], in_unit(settings, xy, pixels=pixels))
+
+        if len(cameras) == 1 and not self.scanned.any():
+            return convert(0, images.xy), sd
+        of_films = self.scanned[images.photos]
+        found = by_camera(images.xy, np.where(of_films, -1, self.of_photos[images.photos]), convert)
+        found[of_films] = scaled(found[of_films], 1e-3 if settings.image == "um" else 1.0)
+        return found, sd
 
 
 _LINES = ("column", "row")
@@ -280,14 +282,11 @@ def with_seams(tables: Tables) -> tuple[Tables, Seams]:
 
 
 def _divided(seams: Seams, name: str, table: ColumnTable) -> ColumnTable:
-    """Return a table in which readings beyond a seam belong to the second half."""
-    if name in ("images", "fiducial_images"):
-        return _parted(table, seams)
-    return _with_halves(table, seams) if name == "photos" else table
-
-
-def _parted(table: ColumnTable, seams: Seams) -> ColumnTable:
-    """Return readings, with the photo of the second half beyond a seam."""
+    """Return a table in which readings beyond a seam belong to the second half, which is another photo."""
+    if name == "photos":
+        return _with_halves(table, seams)
+    if name not in ("images", "fiducial_images"):
+        return table
     texts = table.texts("photo")
     lines = {line: table.numbers(line) for line in _LINES}
     for row, photo in enumerate(texts):
@@ -306,13 +305,13 @@ def _with_halves(table: ColumnTable, seams: Seams) -> ColumnTable:
     more = [row for row, name in enumerate(texts) if name in seams]
     halves, count = [seams[texts[row]].half for row in more], table.count
     found = table.some([*range(count), *more]).with_texts("photo", [*texts, *halves])
-    cells = dict(found.cells)
-    for name in (each for each in table.columns if each.startswith("sd_")):
-        if isinstance(own := found.cells[name], np.ndarray):
-            cells[name] = np.where(np.arange(found.count) < count, own, np.nan)
-        else:
-            cells[name] = [*table.texts(name), *[""] * len(more)]
-    return replace(found, cells=cells)
+    deviations = {
+        name: np.where(np.arange(found.count) < count, own, np.nan)
+        if isinstance(own := found.cells[name], np.ndarray)
+        else [*table.texts(name), *[""] * len(more)]
+        for name in (each for each in table.columns if each.startswith("sd_"))
+    }
+    return replace(found, cells={**found.cells, **deviations})
 
 
 def mounted_halves(

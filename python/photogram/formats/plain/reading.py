@@ -15,13 +15,12 @@ from photogram.formats.builder import BlockBuilder
 from photogram.formats.names import NamedValues
 from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, read_boards
-from photogram.formats.plain.cameras import Cameras, read_cameras, spread_over_photos
+from photogram.formats.plain.cameras import read_cameras, spread_over_photos
 from photogram.formats.plain.films import on_film, read_scanned
 from photogram.formats.plain.observations import Known, read_observations
 from photogram.formats.plain.photos import (
     Images,
-    Photos,
-    image_coordinates,
+    ImageSource,
     images_of,
     mounted_halves,
     read_photos,
@@ -31,7 +30,7 @@ from photogram.formats.plain.rigs import placed, read_frames, read_rigs, read_ti
 from photogram.formats.plain.schema import AXES, SD_AXES, TABLES
 from photogram.formats.plain.settings import read_settings, unread_tables
 from photogram.formats.plain.statement_tables import asked_of, read_cover
-from photogram.formats.plain.tables import Tables, Transform, covariances_of
+from photogram.formats.plain.tables import Tables, Transform, check_rows, covariances_of
 from photogram.formats.plain.trajectories import read_trajectories
 from photogram.formats.plain.unknowns import read_covariances
 from photogram.formats.project import Project, Unused
@@ -52,21 +51,6 @@ def read(path: Path, options: ReadOptions) -> Project:
     settings = read_settings(path / SETTINGS if path.is_dir() else path, options)
     project, _ = read_tables(Tables(settings, unread_tables(settings)), options)
     return project
-
-
-@dataclass(frozen=True)
-class ImageSource:
-    """The table of images of a project, and what its conversion requires."""
-
-    tables: Tables
-    photos: Photos
-    cameras: Cameras
-    of_photos: Indices  # Rows of the cameras of photos
-    scanned: Bools  # Whether photos are scanned
-
-    def converted(self, images: Images) -> tuple[Floats, Floats | None]:
-        """Return image coordinates and standard deviations of the cameras."""
-        return image_coordinates(self.tables.settings, images, self.cameras, self.of_photos, self.scanned)
 
 
 def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSource]:
@@ -138,7 +122,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     ).replace(
         sd_taken=True,
         boards=boards,
-        unused=_unused(source, images) if boards else Unused(),
+        unused=_unused(source, images.left) if boards and images.left is not None else Unused(),
         features=settings.features,
         control_crs=settings.crs.get("control", ""),
         statement=asked_of(tables, places, frozenset() if given is None else given.vegetated),
@@ -156,11 +140,8 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     return project, source
 
 
-def _unused(source: ImageSource, images: Images) -> Unused:
+def _unused(source: ImageSource, left: Images) -> Unused:
     """Return the omitted image observations of a board."""
-    left = images.left
-    if left is None:
-        return Unused()
     xy, sd = source.converted(left)
     return Unused(
         photos=tuple(source.photos.names[row] for row in left.photos.tolist()),
@@ -245,9 +226,8 @@ def _add_points(
         given, _ = transform.positions("points", given, None, table)
         starts[rows] = given
         held: Bools = np.asarray(np.isfinite(own_sd).any(axis=1))
-        if (np.isfinite(own_sd) & np.isnan(given)).any():
-            row = int(np.argwhere(np.isfinite(own_sd) & np.isnan(given))[0][0])
-            raise table.error(row, phrase("plain.sd-alone", value="x, y, z"))
+        alone = (np.isfinite(own_sd) & np.isnan(given)).any(axis=1)
+        check_rows(table, alone, phrase("plain.sd-alone", value="x, y, z"))
         positions[rows] = np.where(held[:, np.newaxis], given, np.nan)
         sd[rows] = own_sd
     rows = np.array([rows_of_names[name] for name in control.names] if control else [], dtype=np.int64)

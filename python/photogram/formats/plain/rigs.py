@@ -87,12 +87,8 @@ def read_frames(
 def sensor_of(table: ColumnTable, row: int, rig: Rig, sensor: str, column: str = "") -> str:
     """Return a sensor, or the camera of a photo, that is on a rig."""
     if sensor != rig.reference and sensor not in rig.sensors:
-        code, fields = "plain.no-sensor-of-rig", {"rig": rig.name, "sensor": sensor}
-        raise (
-            table.cell_error(row, column, code, **fields)
-            if column
-            else table.error(row, phrase(code, **fields))
-        )
+        message = phrase("plain.no-sensor-of-rig", rig=rig.name, sensor=sensor)
+        raise table.error(row, phrase("error.column", column=column, message=message) if column else message)
     return sensor
 
 
@@ -298,7 +294,6 @@ def _motions(tables: Tables, table: ColumnTable) -> list[dict[str, Floats]]:
 
 
 def _line_times(tables: Tables) -> dict[str, Lines]:
-    """Return the line times by photo name."""
     table = tables.rows("line_times")
     groups = rows_of(tables, "line_times")
     values = table.given(("line", "time", "seconds_per_line"))
@@ -353,10 +348,9 @@ def moving_columns(block: Block, rigs: Rigs) -> dict[str, Any]:
 
 def line_times_table(block: Block) -> dict[str, Any]:
     """Return the table of line times."""
-    own = [each for each in block.timed if each.lines is not None]
-    if not own:
-        return {}
-    tables = [np.asarray(each.lines.table) for each in own if each.lines is not None]
-    rows = np.vstack(tables)
-    names = [each.photo for each, table in zip(own, tables, strict=True) for _ in table]
-    return {"photo": names, **columns_of(("line", "time", "seconds_per_line"), rows)}
+    return columns_of_records(
+        {"photo": each.photo} | columns_of(("line", "time", "seconds_per_line"), row)
+        for each in block.timed
+        if each.lines is not None
+        for row in np.asarray(each.lines.table)
+    )

@@ -52,6 +52,11 @@ class Machine:
     readings: Readings
     known: KnownTogether | None
 
+    def words(self, joined: Sequence[Unknown]) -> list[str]:
+        """Return the names of components in the table of covariances."""
+        rows = {id(each): 3 * k for k, each in enumerate((self.scanner, *self.curves))}
+        return [word for each in joined for word in _WORDS[rows[id(each)] : rows[id(each)] + 3]]
+
     def held(self) -> Machine:
         """Return the scanner with fixed parameters."""
         curves = tuple(each.replace(sd=0.0) for each in self.curves)
@@ -192,13 +197,6 @@ def scanner_cells(machine: Machine) -> dict[str, Any]:
     return cells
 
 
-def known_words(machine: Machine) -> list[str]:
-    """Return the names of the components with a joint prior in the table of covariances."""
-    parts = [machine.scanner, *machine.curves]
-    at = [next(k for k, each in enumerate(parts) if each is one) for one in machine.known.joined]  # type: ignore[union-attr]
-    return [word for k in at for word in _WORDS[3 * k : 3 * k + 3]]
-
-
 def read_films(tables: Tables, names: Sequence[str], default: str) -> Mapping[str, FilmKind]:
     """Read the table of films; films without a row have defaults."""
     table, defaults = tables.rows("films"), {"model": default, **TABLES["films"].defaults}
@@ -223,7 +221,6 @@ def _film_kind(name: str, cells: Mapping[str, Any]) -> FilmKind:
 
 
 def _pattern(table: ColumnTable, row: int, cells: Mapping[str, Any]) -> Pattern:
-    """Return the pattern of a film."""
     kind, film = cells["pattern"], cells["film"]
     count = 10 if kind == "ebner" else 2
     names = GRID if kind == "grid" else ("half_format_mm",)
@@ -239,7 +236,6 @@ def _pattern(table: ColumnTable, row: int, cells: Mapping[str, Any]) -> Pattern:
 def _reseau(
     table: ColumnTable, row: int, numbers: Sequence[Any], photo: str, shifts: Floats | None = None
 ) -> Reseau:
-    """Return the reseau of a photo."""
     free = made(table, row, Reseau, photo, *numbers)
     return free if shifts is None else free.with_shifts(shifts)
 

@@ -65,7 +65,7 @@ def deviation_columns(names: Sequence[str]) -> tuple[str, ...]:
 
 
 ENDS = ("from", "to")
-SD_AXES, SD_ROTATIONS = deviation_columns(AXES), deviation_columns(ROTATIONS)
+SD_AXES = deviation_columns(AXES)
 DEVICE = ("sx", "sy", "alpha_rad")  # Scales and obliqueness of a scanner
 CURVES = tuple(f"{axis}{letter}" for axis in "xy" for letter in "abcdefghj")
 """Coefficients of its polynomials."""

@@ -20,12 +20,12 @@ from photogram.errors import InputError, message_of
 from photogram.formats.columns import Columns, columns_given
 from photogram.formats.declarations import declared
 from photogram.formats.plain.schema import TABLES, WITH_SD
-from photogram.formats.project import Frame
 from photogram.formats.read_options import ReadOptions
 from photogram.io.places import at_place
 from photogram.io.toml import TomlTree, quoted_text, read_document, read_toml
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, unknown_name
+from photogram.network.frame import Frame
 from photogram.results.features import KINDS, Definition
 from photogram.words import Phrase, phrase
 
@@ -76,8 +76,14 @@ class Key(NamedTuple):
                 if not valid(*numbers):
                     raise table[name].value_error(code)
                 return numbers
+            case "moment" if isinstance(value, int | float):
+                return table[name].number()
             case "moment":
-                return _moment(table, name, value)
+                try:  # TOML has a date type.
+                    day = value if isinstance(value, date) else datetime.fromisoformat(value)
+                except (TypeError, ValueError):
+                    raise table[name].value_error("plain.time-origin") from None
+                return day.isoformat()
             case "day":
                 return table[name].day()
             case "date" if type(value) is date:
@@ -110,17 +116,6 @@ class Key(NamedTuple):
         return SENTENCES if self.kind == "sentences" else f"{float(value)!r}{ending[self.kind]}"
 
 
-def _moment(table: TomlTree, name: str, value: Any) -> float | str:
-    """Return a number of seconds, or a date as text."""
-    if isinstance(value, int | float):
-        return table[name].number()
-    try:
-        # TOML has a date type.
-        return value.isoformat() if isinstance(value, date) else datetime.fromisoformat(value).isoformat()
-    except (TypeError, ValueError):
-        raise table[name].value_error("plain.time-origin") from None
-
-
 def _existing(table: TomlTree, key: str, name: str, kind: str = "file") -> Path:
     """Return the path of an existing file or folder."""
     path = table.file.parent / name
@@ -136,13 +131,8 @@ KEYS = tuple(Key(*row) for row in declared(__file__, "keys.csv"))
 
 def read_keys(file: TomlTree) -> dict[str, dict[str, Any]]:
     """Return the values of the keys in a file by the first part of their fields, and by field."""
-    found: dict[str, dict[str, Any]] = {
-        "": {},
-        "frame": {},
-        "options": {},
-        "photo_files": {},
-        "statement": {},
-    }
+    parts = ("", "frame", "options", "photo_files", "statement")
+    found: dict[str, dict[str, Any]] = {part: {} for part in parts}
     for key in KEYS:
         table = file.table(key.section)
         if key.name not in table or key.kind == "version":
@@ -151,22 +141,17 @@ def read_keys(file: TomlTree) -> dict[str, dict[str, Any]]:
         with at_place(table[key.name]):
             value = key.value(table, found[""].get("length", "m"))
             if of == "statement":
-                field, value = _asked(field, value)
+                from photogram.results.statement.request import Asked
+                from photogram.results.statement.texts import Texts
+
+                if field.startswith(_CLASS):
+                    field, value = "classes", {field.removeprefix(_CLASS): value}
+                if field == "language":
+                    Texts(value)
+                # The existence of lengths is unknown before the tables are read.
+                value = getattr(Asked.checked(lengths=(_SOME_LENGTH,), **{field: value}), field)
         found[of][field] = {**found[of].get(field, {}), **value} if field == "classes" else value
     return found
-
-
-def _asked(field: str, value: Any) -> tuple[str, Any]:
-    """Return an option of :meth:`photogram.Result.statement` and its checked value."""
-    from photogram.results.statement.request import Asked
-    from photogram.results.statement.texts import Texts
-
-    if field.startswith(_CLASS):
-        field, value = "classes", {field.removeprefix(_CLASS): value}
-    if field == "language":
-        Texts(value)
-    # The existence of lengths is unknown before the tables are read.
-    return field, getattr(Asked.checked(lengths=(_SOME_LENGTH,), **{field: value}), field)
 
 
 def key_tables(
@@ -279,6 +264,11 @@ def read_settings(path: Path, reading: ReadOptions | None = None) -> Settings:
     if project.at("format").value is not VERSION:
         raise project.at("format").value_error("plain.version", version=VERSION)
     values = read_keys(file)
+    given, sd = file.table("sd"), dict[str, tuple[float, ...]]()
+    for name in given.value:
+        sd[name] = tuple(given[name].numbers(*WITH_SD[name], infinite=True))
+        if min(sd[name]) < 0:
+            raise given[name].value_error("error.not-negative")
     options, photo_files = values["options"], values["photo_files"]
     photo_files |= {"photos_crs": photo_files.get("photos_crs") or None}
     if options.get("loss") == "none":
@@ -290,7 +280,7 @@ def read_settings(path: Path, reading: ReadOptions | None = None) -> Settings:
         frame=Frame(**values["frame"]),
         options=AdjustOptions(**options),
         **values[""],
-        sd=_deviations(file.table("sd")) | dict(reading.sd),
+        sd=sd | dict(reading.sd),
         tables=_tables(file.table("tables")),
         crs={name: file[name]["crs"].text() for name in WITH_CRS if "crs" in file.table(name)},
         columns={name: _columns(file[name]) for name in WITH_CRS if name in file}
@@ -302,7 +292,6 @@ def read_settings(path: Path, reading: ReadOptions | None = None) -> Settings:
 
 
 def _columns(table: TomlTree) -> Columns:
-    """Return the columns and roles of a table of points."""
     with at_place(table.at("columns")):
         columns = columns_given(table.get("columns", "").text(), None)
     with at_place(table.at("roles")):
@@ -310,7 +299,6 @@ def _columns(table: TomlTree) -> Columns:
 
 
 def _features(table: TomlTree) -> dict[str, Definition]:
-    """Return the type and the points of each feature."""
     features: dict[str, Definition] = {}
     for name, value in table.value.items():
         if not isinstance(value, dict) or len(value) != 1:
@@ -320,14 +308,6 @@ def _features(table: TomlTree) -> dict[str, Definition]:
             raise table[name].error(unknown_name("kind of features", kind, KINDS))
         features[name] = kind, table[name][kind].texts()
     return features
-
-
-def _deviations(table: TomlTree) -> dict[str, tuple[float, ...]]:
-    found = {name: tuple(table[name].numbers(*WITH_SD[name], infinite=True)) for name in table.value}
-    for name, values in found.items():
-        if min(values) < 0:
-            raise table[name].value_error("error.not-negative")
-    return found
 
 
 def unread_tables(settings: Settings) -> list[Message]:

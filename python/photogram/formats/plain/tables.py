@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError, message_of
@@ -28,15 +29,15 @@ from photogram.formats.plain.schema import (
     covariance_columns,
 )
 from photogram.formats.plain.settings import Settings
-from photogram.formats.project import Frame
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.io.delimited import BATCH, read_batches, read_rows
-from photogram.io.numbers import MATRIX_ROUNDING, degrees_typed
+from photogram.io.numbers import MATRIX_ROUNDING, degrees_typed, finite_number
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes, Representation, angles_form, known_angles
 from photogram.network.block import Block
+from photogram.network.frame import Frame
 from photogram.network.observations import Observation, Observations
 from photogram.network.unknowns import Unknown
 from photogram.words import Phrase, phrase
@@ -82,31 +83,6 @@ def word_of(unknown: Unknown | None) -> str:
     return unknown.title if unknown.name.lower() in TRUE | FALSE else unknown.name
 
 
-@dataclass(frozen=True)
-class Shared:
-    """The named unknowns of a project, by type and name."""
-
-    _known: dict[tuple[type[Unknown], str], Unknown] = field(default_factory=dict)
-
-    def one(
-        self,
-        table: ColumnTable,
-        row: int,
-        column: str,
-        kind: type[_Kind],
-        name: str,
-        **fields: Any,
-    ) -> _Kind:
-        """Return the object of a name, shared by all rows with this name."""
-        new = made(table, row, kind, name, **fields)
-        own = self._known.setdefault((kind, name), new)
-        pairs = [(each.row()[1:], each.is_open, getattr(each, "epoch", None)) for each in (own, new)]
-        if pairs[0] != pairs[1]:
-            raise table.cell_error(row, column, "plain.other-values", name=name)
-        assert isinstance(own, kind)
-        return own
-
-
 _Named = TypeVar("_Named")
 _NUMBERS: Mapping[str, tuple[str, Callable[[Floats], Bools]]] = {
     "sd": ("error.not-negative", lambda values: values >= 0),
@@ -130,7 +106,8 @@ class Tables:
     settings: Settings  # Settings of the project
     messages: list[Message]  # Remarks
     names: Collection[str] = ()  # Observed points, if they are known before the tables are read
-    shared: Shared = field(default_factory=Shared)  # Shared parameters in rows of all tables
+    shared: dict[tuple[type[Unknown], str], Any] = field(default_factory=dict)
+    """Unknowns in rows of all tables, by type and name."""
     parsed: dict[str, ColumnTable | None] = field(default_factory=dict)
     change: Callable[[str, ColumnTable], ColumnTable] = lambda _, table: table  # Of each batch of a table
 
@@ -225,7 +202,8 @@ class Tables:
             case "ref":
                 if required:
                     table.names(name)
-                named_of(table, name, dict.fromkeys(self.names_in(column.field)), name)
+                known = self.rows(column.field).texts(TABLES[column.field].columns[0])
+                named_of(table, name, dict.fromkeys(known), name)
         if column.kind in TEXTS:
             texts = table.texts(name)
             if required and "" in texts:
@@ -243,9 +221,16 @@ class Tables:
         convert = int if column.kind == "whole" else float
         return [math.nan if math.isnan(each) else convert(each) for each in values[:, 0].tolist()]
 
-    def names_in(self, name: str) -> list[str]:
-        """Return the different names in the first column of a table."""
-        return list(dict.fromkeys(self.rows(name).texts(TABLES[name].columns[0])))
+    def unknown(
+        self, table: ColumnTable, row: int, column: str, kind: type[_Kind], name: str, **fields: Any
+    ) -> _Kind:
+        """Return the unknown of a name, shared by all rows with this name."""
+        new = made(table, row, kind, name, **fields)
+        own: _Kind = self.shared.setdefault((kind, name), new)
+        pairs = [(each.row()[1:], each.is_open, getattr(each, "epoch", None)) for each in (own, new)]
+        if pairs[0] != pairs[1]:
+            raise table.cell_error(row, column, "plain.other-values", name=name)
+        return own
 
     def remark(self, code: str, path: Path | None = None, /, **fields: Any) -> None:
         """Add a remark, optionally on a file."""
@@ -253,8 +238,6 @@ class Tables:
 
     def angle(self, text: str) -> float:
         """Return an angle in radians from a cell in the unit of the project."""
-        from photogram.io.numbers import finite_number
-
         return (degrees if self.settings.angle == "dms" else finite_number)(text) * self.radians
 
     def angles(
@@ -286,14 +269,17 @@ class Tables:
                     raise table.error(row, phrase("plain.quaternion", length=size))
                 if kind == "matrix" and not is_rotation(values[row].reshape(3, 3)):
                     raise table.error(row, phrase("plain.rotation-matrix"))
-            found[known] = matrices_of(self.settings, values[known])
+            given = values[known].reshape(-1, 3, 3) if kind == "matrix" else values[known]
+            own = Attitudes.of(cast("Representation", kind), given).matrices
+            if kind not in ("yaw_pitch_roll", "azimuth_tilt_swing"):
+                # Numbers of these types define a matrix Q; the settings define its direction.
+                inverse = kind in ("omega_phi_kappa", "phi_omega_kappa")
+                if inverse != (self.settings.rotation == "object_to_photo"):
+                    own = own.transpose(0, 2, 1)
+                if self.settings.photo == "y_down":
+                    own = own @ Y_DOWN
+            found[known] = own
         return found
-
-    def check_known(self, table: ColumnTable, matrices: Floats) -> None:
-        """Reject missing attitudes."""
-        unknown = np.isnan(matrices).any(axis=(1, 2))
-        if unknown.any():
-            raise table.error(int(np.argmax(unknown)), phrase("plain.no-angles"))
 
     @property
     def radians(self) -> float:
@@ -329,21 +315,6 @@ class Tables:
         for row, k in np.argwhere(found < 0)[:1].tolist():
             raise table.cell_error(row, columns[k], "error.not-negative", value=float(found[row, k]))
         return found
-
-
-def matrices_of(settings: Settings, values: Floats) -> Floats:
-    """Return (n, 3, 3) attitudes A, photo to object, from their numbers in tables."""
-    kind = settings.attitude
-    given = values.reshape(-1, 3, 3) if kind == "matrix" else values
-    found = Attitudes.of(cast("Representation", kind), given).matrices
-    if kind in ("yaw_pitch_roll", "azimuth_tilt_swing"):
-        return found
-    # Numbers of these types define a matrix Q; the settings define its direction.
-    turned = found.transpose(0, 2, 1) if kind in ("omega_phi_kappa", "phi_omega_kappa") else found
-    to_photo = turned if settings.rotation == "object_to_photo" else turned.transpose(0, 2, 1)
-    if settings.photo == "y_down":
-        to_photo = Y_DOWN @ to_photo
-    return np.asarray(to_photo.transpose(0, 2, 1))
 
 
 def covariances_of(
@@ -396,10 +367,13 @@ def named_of(table: ColumnTable, column: str, known: Mapping[str, _Named], kind:
 
 def check_complete(table: ColumnTable, values: Floats, message: Phrase) -> None:
     """Reject rows with only some of the numbers of a vector."""
-    partly = np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1)
-    if partly.any():
-        row = int(np.flatnonzero(partly)[0])
-        raise table.error(row, message)
+    check_rows(table, np.isnan(values).any(axis=1) & ~np.isnan(values).all(axis=1), message)
+
+
+def check_rows(table: ColumnTable, wrong: ArrayLike, message: Phrase) -> None:
+    """Reject a table with wrong rows; the error names the first one."""
+    if np.any(wrong):
+        raise table.error(int(np.argmax(wrong)), message)
 
 
 def correlations(

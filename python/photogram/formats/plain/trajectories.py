@@ -16,6 +16,7 @@ from photogram.formats.plain.tables import (
     Tables,
     angles_of,
     check_complete,
+    check_rows,
     columns_of,
     columns_of_records,
     correlations,
@@ -107,7 +108,7 @@ def _attitudes(tables: Tables, name: str, axes: Floats | None = None) -> dict[st
     table = tables.rows(name)
     groups = rows_of(tables, name)
     times, matrices = increasing(table, groups), tables.matrices(table)
-    tables.check_known(table, matrices)
+    check_rows(table, np.isnan(matrices).any(axis=(1, 2)), phrase("plain.no-angles"))
     if axes is not None:
         matrices = matrices @ axes
     return {of: (times[rows], matrices[rows]) for (of,), rows in groups.items()}
@@ -265,7 +266,6 @@ def _unit(kind: str) -> float:
 
 
 def _cells(own: Trajectory) -> dict[str, Any]:
-    """Return the row of a trajectory."""
     found: dict[str, Any] = {
         "trajectory": own.name,
         "interpolation": own.table.interpolation,
@@ -295,7 +295,6 @@ def _common_sd(own: Trajectory, which: int) -> float | None:
 
 
 def _dated(parts: Sequence[tuple[str, Any]]) -> dict[str, Any]:
-    """Return the columns of names and times."""
     names = [name for name, times in parts for _ in np.asarray(times)]
     return {"trajectory": names, "time": np.concatenate([times for _, times in parts])}
 
@@ -307,7 +306,7 @@ def _turns_written(parts: Sequence[tuple[str, Any, Any]], block: Block) -> dict[
 
 def smoothness_table(block: Block) -> dict[str, Any]:
     """Return the table of sums of neighbouring coefficients."""
-    own = [(each, place) for each, place in _beside(block) if place is not None]
+    own = [(each, place) for each, place in smoothness_beside(block) if place is not None]
     if not own:
         return {}
     units = np.array([_unit(place[1]) for _, place in own])[:, np.newaxis]
@@ -323,13 +322,8 @@ def smoothness_table(block: Block) -> dict[str, Any]:
     return columns_of_records(rows) | correlations(covariances, AXES)
 
 
-def lost_smoothness(block: Block) -> int:
-    """Return the number of sums that the table cannot contain."""
-    return sum(place is None for _, place in _beside(block))
-
-
-def _beside(block: Block) -> list[tuple[Smoothness, Place | None]]:
-    """Return sums not defined by splines, each with its first key."""
+def smoothness_beside(block: Block) -> list[tuple[Smoothness, Place | None]]:
+    """Return sums not defined by splines, each with its first key; None if the table cannot contain it."""
     shared = shared_trajectories(block)
     places = {
         id(each): (trajectory.name, of, k)

@@ -18,6 +18,7 @@ from photogram.formats.plain.tables import (
     angles_of,
     called,
     check_complete,
+    check_rows,
     columns_of,
     columns_of_records,
     made,
@@ -52,7 +53,7 @@ def read_observed(tables: Tables, table: ColumnTable, column: Column, *, whole: 
     """Return the values of a quantity as :func:`read_values`, numbers as a list; reject NaN if `whole`."""
     values = read_values(tables, table, column)
     if column.kind in TURNS:
-        tables.check_known(table, values)
+        check_rows(table, np.isnan(values).any(axis=(1, 2)), phrase("plain.no-angles"))
     elif whole:
         table.check_given(values, column.names)
     return values if values[0:1].size != len(values[0:1]) else values[:, 0].tolist()
@@ -112,7 +113,7 @@ def read_unknowns(
         elif not name or (rule == "any" and not cell and not sd[row].any() and [*fields.values()] == usual):
             found.append(None)
         else:
-            found.append(tables.shared.one(table, row, unknown.name, make, name, sd=sd[row], **fields))
+            found.append(tables.unknown(table, row, unknown.name, make, name, sd=sd[row], **fields))
     return found
 
 

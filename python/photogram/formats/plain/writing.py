@@ -11,7 +11,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.images import by_camera, to_tables
 from photogram.formats.models import correlated_control, known_cameras, known_points
-from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table, levels
+from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, boards_table
 from photogram.formats.plain.cameras import Exposure, exposure_cells, knots_table, of_cameras
 from photogram.formats.plain.films import WrittenFilms
 from photogram.formats.plain.observations import observation_tables
@@ -26,7 +26,7 @@ from photogram.formats.plain.tables import (
     places_written,
     signs_in_files,
 )
-from photogram.formats.plain.trajectories import lost_smoothness, smoothness_table, trajectory_tables
+from photogram.formats.plain.trajectories import smoothness_beside, smoothness_table, trajectory_tables
 from photogram.formats.plain.unknowns import covariance_tables
 from photogram.formats.project import Project, Size
 from photogram.io.csv_text import csv_text
@@ -45,7 +45,7 @@ def cannot_hold(project: Project) -> list[str]:
     """Return the parts of a project that the tables cannot contain."""
     block = project.block
     found = [] if block.refraction is None else ["refraction"]
-    if sums := lost_smoothness(block):
+    if sums := sum(place is None for _, place in smoothness_beside(block)):
         found.append(f"{sums} sums of coefficients that are no neighbours, or too many")
     cameras, which = known_cameras(block)
     lost = Rigs(block, [cameras[row].name for row in which], {}).lost
@@ -235,8 +235,9 @@ def _images(
         names[1]: xy[:, 1],
     }
     sd = np.vstack([block.image_sd, left.sd[kept]])
-    level = levels(sd, assumed=bool(project.boards) and bool(project.details.get(ASSUMED)))
-    if level is not None:
+    assumed = bool(project.boards) and bool(project.details.get(ASSUMED))
+    level = np.round(np.log2(sd[:, 0])) if assumed else sd[:, 0]
+    if assumed and np.array_equal(2.0**level, sd[:, 0]):
         columns["level"] = level.astype(np.int64)
     elif (sd[:, 0] == sd[:, 1]).all():
         columns["sd"] = sd[:, 0]
