@@ -26,6 +26,7 @@ CODE = 110  # Characters of a line of code on a page
 PANEL = re.compile(r"^╭─ (.*?) ─+╮\n(.*?)^╰", re.DOTALL | re.MULTILINE)
 VARIANT = re.compile(r"(\.one(\.\w+)?)?(\.cli)?$")
 FIELD = re.compile(r"\{(\w+)[^}]*\}")
+COUNTED = re.compile(r"\{\w+:[^/}]*/([^}]*)\}")  # Words for a count of one, and for others
 REMEDY = re.compile(
     r"(\(<var>option</var>[^)]*\)|(?<=[;.:,] )(?:(?:so|then|and) )?(?:"
     "add|adjust|assign|calibrate|change|check|choose|close|combine|compare|convert|copy|correct|count|create|define"
@@ -48,7 +49,7 @@ def cell(text: str) -> str:
     """Return text for a cell of an HTML table: backquotes are code, the fields of messages are variables."""
     text = FIELD.sub(
         lambda field: f"<var>{field[1].replace('_', ' ')}</var>",
-        escape(APPENDED.sub("; ", text), quote=False),
+        escape(APPENDED.sub("; ", COUNTED.sub(r"\1", text)), quote=False),
     )
     text = re.sub(r"`([^`]+)`", r"<code>\1</code>", text)
     return text.replace(COMMAND, "<br><em>On the command line:</em> ")

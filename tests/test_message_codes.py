@@ -39,6 +39,7 @@ def test_forms_of_fields():
         "a.number": "{n:.3g}", "a.list": "{names:2}", "a.numbered": "{names:#}", "a.or": "{names:|}",
         "a.parts": "before{parts:+;}", "a.capital": "{name:^}",
         "a.count": "{n} points", "a.count.one": "{n} point",
+        "a.counted": "{n} {n:point is/points are} missing",
     })  # fmt: skip
     assert own("a.number", n=2 / 3) == "0.667"
     assert own("a.list", names=["A", "B", "C"]) == "A, B and 1 more"
@@ -48,6 +49,8 @@ def test_forms_of_fields():
     assert own("a.parts", parts=["x", Phrase("named.photo", {"photo": "3"})]) == "before; x; photo 3"
     assert own("a.capital", name=Phrase("named.photo", {"photo": "3"})) == "Photo 3"
     assert (own("a.count", n=1), own("a.count", n=2)) == ("1 point", "2 points")
+    assert own("a.counted", n=1) == "1 point is missing"
+    assert own("a.counted", n=2) == "2 points are missing"
     assert Words("de")("part.factor", factor=1.5, low=1.25, high=2.0) == "1,5 (95 Prozent: 1,25 bis 2)"
 
 

@@ -20,7 +20,7 @@ from photogram.results.covariance import adjusted
 from photogram.results.features import KINDS as FORMS
 from photogram.results.features import through
 from photogram.results.grouping import observables
-from photogram.results.parts import named_observation, parts_of
+from photogram.results.parts import kind_words, named_observation, parts_of
 from photogram.results.statement import budget
 from photogram.results.statement.texts import LANGUAGES, Texts
 from photogram.statistics.verdict import RULES
@@ -55,10 +55,9 @@ def test_every_kind_of_observation_has_a_word(result):
     kinds = shipped(Observation) | shipped(Unknown)
     assert len(kinds) > 15
     names = {budget.kind_of(each) for each in kinds} | set(budget._PLURALS.values())
-    names |= {"images", "control", "camera", *observables(result).stations}
+    names |= {"image", "images", "control", "camera", *observables(result).stations}
     assert not lacking("kind", names)
-    singles = {budget.kind_of(each) for each in kinds} | {"image", "control", "camera", "attitude"}
-    assert not lacking("one", singles)
+    assert GERMAN.text(kind_words("prior, distance")) == "Vorwert, Strecke"
     assert GERMAN.kind("prior, lever arm") == "Vorwerte, Hebelarm"
     assert GERMAN.kind("images, 2, x") == "Bildpunkte, 2, x"
     assert ENGLISH.kind("smoothness, 4 position coefficients") == "smoothness, 4 position coefficients"

@@ -166,8 +166,8 @@ def named_observation(kind: str, of: str) -> Phrase:
 
 
 def kind_words(kind: str) -> list[Phrase]:
-    """Return the words of a type, such as `prior, lever arm`."""
-    return [Phrase(f"one.{each}") for each in kind.split(", ")]
+    """Return the words of a single observation of a type, such as `prior, lever arm`."""
+    return [Phrase(f"kind.{each}", {"n": 1}) for each in kind.split(", ")]
 
 
 def parts_of(components: Iterable[str], name: Phrase) -> Phrase:

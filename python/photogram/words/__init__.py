@@ -7,10 +7,11 @@ A :class:`Phrase` is a code with fields until it is printed. Each language has o
 * a list format: the largest number of parts (`{names:5}`), `;`, `&` (and) or `|` (or) as separator instead of
   commas, and `#` for parts with numbers;
 * `^` for an initial capital letter, `+` for `; ` before a text that is not empty;
+* `one/several`, the words for a count of one and for other counts: `{n} {n:point/points}`;
 * `'` for a quoted text of the input, escaped and shortened. Numbers, lists and phrases are not quoted.
 
-`code.one` is the sentence if the field `n` is 1, `code.one.name` if the field `name` is 1. `code.cli` is the
-sentence on the command line: it names options, the other one functions of Python.
+`code.one` is another sentence if the field `n` is 1, `code.one.name` if the field `name` is 1. `code.cli` is
+the sentence on the command line: it names options, the other one functions of Python.
 """
 
 from __future__ import annotations
@@ -142,7 +143,10 @@ class Words:
         return self._composed(code, fields)
 
     def text(self, value: Any, form: str = "") -> str:
-        """Return a phrase, a list, a number or a text in the language."""
+        """Return a phrase, a list, a number or a text in the language, or words for a count."""
+        one, slash, several = form.partition("/")
+        if slash:
+            return one if value == 1 else several
         if isinstance(value, Phrase):
             text = self._composed(value.code, value.fields)
         elif isinstance(value, list | tuple):

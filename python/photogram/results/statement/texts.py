@@ -12,7 +12,7 @@ from photogram.arguments.arrays import argument_error, one_of
 from photogram.errors import InputError
 from photogram.messages import unknown_name
 from photogram.show.page import fixed, probability_written
-from photogram.words import Phrase, Words, phrase, table_of
+from photogram.words import Words, phrase, table_of
 
 LANGUAGES = ("en", "de")
 NOTHING = "–"  # Missing number
@@ -35,17 +35,20 @@ class Texts(Words):
         self.language, self.unit = language, unit
         english = table_of("en")
         for key, sentence in (own or {}).items():
-            if key not in english:
+            # Sentences of a firm may have another form for a count of one.
+            sentence_of = english.get(key) or english.get(key.partition(".one")[0])
+            if sentence_of is None:
                 alike = [code for code in english if code.partition(".")[0] == key.partition(".")[0]]
                 absent = phrase("error.absent", kind="code", name=key)
                 raise InputError(unknown_name("code", key, alike) if alike else absent)
             if not isinstance(sentence, str):
                 raise argument_error(key, "text", value=sentence)
-            known = fields_of(english[key])
+            known = fields_of(sentence_of)
             if strange := fields_of(sentence) - known:
                 fields = {"field": sorted(strange)[0], "names": sorted(known)}
                 raise InputError(phrase("request.field", code=key, **fields))
-            if any(form or conversion for *_, form, conversion in Formatter().parse(sentence)):
+            parts = Formatter().parse(sentence)
+            if any((form and "/" not in form) or conversion for *_, form, conversion in parts):
                 raise InputError(phrase("request.form", code=key, value=sentence))
         super().__init__(language, own)
         own = table_of(language)
@@ -120,9 +123,9 @@ class Texts(Words):
             return given
         return self._table["date"].format(year=day.year, month=f"{day.month:02}", day=f"{day.day:02}")
 
-    def word(self, family: str, name: str) -> str:
+    def word(self, family: str, name: str, **count: int) -> str:
         """Return a word of another module in the language; without a key unchanged."""
-        return self.text(Phrase(f"{family}.{name}"))
+        return self(f"{family}.{name}", **count)
 
     def kind(self, name: str) -> str:
         """Return the plural of a type: `images`, `prior, lever arm`, ..."""
@@ -136,7 +139,7 @@ class Texts(Words):
     def observation(self, parts: Sequence[str]) -> str:
         """Return the name of an observation from type, items, and component."""
         kind, *things, component = parts
-        one = ", ".join(self.word("one", part) for part in kind.split(", "))
+        one = ", ".join(self.word("kind", part, n=1) for part in kind.split(", "))
         return " ".join([one, *things, self.word("axis", component)])
 
 
