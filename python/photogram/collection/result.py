@@ -17,15 +17,12 @@ from photogram.results.network import AdjustedNetwork
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import pandas as pd
-
     from photogram import _photocore
     from photogram.collection import Collection
     from photogram.io.writing import Content
     from photogram.plots.picture_data import Pictured
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.parts import Terms
-    from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
@@ -72,11 +69,6 @@ class AdjustedCollection(AdjustedNetwork):
 
         return collection_findings(self)
 
-    def _table(self, what: str) -> pd.DataFrame:
-        from photogram.results.tables import table_frame
-
-        return table_frame(self, what)
-
     def _files(self) -> Mapping[str, Content]:
         from photogram.collection.result_files import collection_files
 
@@ -87,13 +79,6 @@ class AdjustedCollection(AdjustedNetwork):
         from photogram.collection.document import collection_document
 
         return collection_document(self)
-
-    @cached_property
-    def reliability_summary(self) -> ReliabilitySummary | None:
-        """The reliability summary of reports; see `AdjustedNetwork`."""
-        from photogram.results.evaluation import reliability_summary
-
-        return reliability_summary(self)
 
     @property
     def given(self) -> Collection:
@@ -121,12 +106,6 @@ class AdjustedCollection(AdjustedNetwork):
         """(P, k) given minus adjusted parameters; 0 if fixed, NaN if free."""
         residuals = self.collection.photo_parameters - self.photo_parameters
         return np.where(np.isfinite(self.photo_given_sd), residuals, np.nan)
-
-    @property
-    def point_residuals(self) -> Floats:
-        """(n, 3) given minus adjusted coordinates; 0 if fixed, NaN if free."""
-        residuals = self.collection.point_positions - self.point_positions
-        return np.where(np.isfinite(self.point_given_sd), residuals, np.nan)
 
     def _adjusted(self) -> Adjusted:
         names, photos, points = self.collection.parameters, self.given.photo_ids, self.given.point_ids

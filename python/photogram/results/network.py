@@ -315,13 +315,15 @@ class AdjustedNetwork(Valued, Judged, Documented, ABC):
             trial.out = lost.out
         return Reliability(trial, self.covariances, lost, level=level, power=power, unit_weight=unit_weight)
 
-    @property
-    @abstractmethod
+    @cached_property
     def reliability_summary(self) -> ReliabilitySummary | None:
         """The reliability summary of reports, with tests of all groups.
 
         None without redundancy numbers or convergence.
         """
+        from photogram.results.evaluation import reliability_summary
+
+        return reliability_summary(self)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
         """Return additional facts for hypotheses; empty by default."""
@@ -397,8 +399,14 @@ class AdjustedNetwork(Valued, Judged, Documented, ABC):
     def photo_given_sd(self) -> Floats: ...
 
     @property
-    @abstractmethod
-    def point_residuals(self) -> Floats: ...
+    def point_differences(self) -> Floats:
+        """(n, 3) adjusted minus given coordinates; NaN if not given."""
+        return self.point_positions - self.given.point_positions
+
+    @property
+    def point_residuals(self) -> Floats:
+        """(n, 3) observed minus adjusted weighted components; 0 if fixed, NaN if free."""
+        return np.where(np.isfinite(self.point_given_sd), -self.point_differences, np.nan)
 
     @property
     def point_given_sd(self) -> Floats:
@@ -476,7 +484,9 @@ class AdjustedNetwork(Valued, Judged, Documented, ABC):
 
     def _table(self, what: str) -> pd.DataFrame:
         """Return a table by the type of its items."""
-        raise NotImplementedError
+        from photogram.results.tables import table_frame
+
+        return table_frame(self, what)
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values, sd, attitudes in degrees."""

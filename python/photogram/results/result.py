@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from photogram.results.calibration import Calibration
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.parts import Terms
-    from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
@@ -166,13 +165,6 @@ class Result(OnFilm, AdjustedNetwork):
         from photogram.results.document import block_document
 
         return block_document(self)
-
-    @cached_property
-    def reliability_summary(self) -> ReliabilitySummary | None:
-        """The reliability summary of reports; see `AdjustedNetwork`."""
-        from photogram.results.evaluation import reliability_summary
-
-        return reliability_summary(self)
 
     def _findings(self) -> Findings:
         from photogram.results.findings import block_findings
@@ -319,9 +311,7 @@ class Result(OnFilm, AdjustedNetwork):
         )
 
     def _table(self, what: str) -> pd.DataFrame:
-        from photogram.results.tables import table_frame
-
-        table = table_frame(self, what)
+        table = super()._table(what)
         table.attrs["datum"] = str(self.datum)
         return table
 
@@ -380,11 +370,6 @@ class Result(OnFilm, AdjustedNetwork):
         given = np.hstack([self.block.photo_position_sd, self.block.photo_attitude_sd])
         return np.where(timed_photos(self.block)[:, np.newaxis], np.inf, given)
 
-    @property
-    def point_residuals(self) -> Floats:
-        """(n, 3) observed minus adjusted weighted components; 0 if fixed, NaN if free."""
-        return np.where(np.isfinite(self.block.point_sd), -self.point_differences, np.nan)
-
     @cached_property
     def point_kinds(self) -> NDArray[np.str_]:
         """(n,) `control` if observed, `check` if known only, else `pass`."""
@@ -396,7 +381,7 @@ class Result(OnFilm, AdjustedNetwork):
 
         Differences of longitudes are at most half a rotation, on either side of the antimeridian.
         """
-        differences = self.point_positions - self.block.point_positions
+        differences = super().point_differences
         if self.block.geographic:
             differences[:, 0] = least_turns(differences[:, 0])
         return differences
