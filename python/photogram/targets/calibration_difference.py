@@ -260,16 +260,12 @@ class _Expected:
         self.a, self.b, self.fitted = a, b, fitted
         points = points_at(a.camera, pixels, distances)
         weights = _weights(a, b, pixels, distances, "pixels")
-        moved = self._moved(points, fitted.finite)
+        moved = transformed(fitted.motion, points)
         usable = np.isfinite(weights).all(axis=(1, 2)) & np.isfinite(imaged(b.camera, moved).xy).all(axis=1)
         self.rows = [
             fixed_points(side.camera, each[usable], weights[usable], fitted.finite)
             for side, each in ((a, points), (b, moved))
         ]
-
-    def _moved(self, points: Floats, finite: bool) -> Floats:
-        motion = self.fitted.motion
-        return transformed(motion, points) if finite else points @ motion[:3, :3].T
 
     def covariances(self, pixels: Floats, distances: tuple[float, ...]) -> Floats:
         """Return (D, n, 2, 2) Q_a + Q_b."""
@@ -278,7 +274,8 @@ class _Expected:
             finite = bool(np.isfinite(each))
             points = points_at(self.a.camera, pixels, [each])
             own = self.a.covariances(points, finite, self.rows[0])
-            found.append(own + self.b.covariances(self._moved(points, finite), finite, self.rows[1]))
+            moved = transformed(self.fitted.motion, points)
+            found.append(own + self.b.covariances(moved, finite, self.rows[1]))
         return np.stack(found)
 
     def test(self, size: tuple[int, int], distances: tuple[float, ...]) -> DifferenceTest:
@@ -300,7 +297,7 @@ class _Expected:
             own = [
                 side.partials(places, finite, rows) @ _root(side.covariance)
                 for side, places, rows in zip(
-                    (a, b), (points, self._moved(points, finite)), self.rows, strict=True
+                    (a, b), (points, transformed(self.fitted.motion, points)), self.rows, strict=True
                 )
             ]
             effects.append(np.concatenate(own, axis=2))
@@ -335,7 +332,7 @@ HUBER_THETA_SQUARED = np.radians(5.0) ** 2  # the criterion of mrcal increases m
 class Fitted:
     """Fitted motion between the axes of two cameras."""
 
-    motion: Floats  # (4, 4) axes of camera a -> axes of camera b
+    motion: Floats  # (4, 4) axes of camera a -> axes of camera b; without translation unless finite
     finite: bool  # whether the translation was fitted: all distances are finite
     points: int  # number of pixels of the fit, counted at every distance
 
@@ -349,8 +346,7 @@ def points_at(camera: Camera, pixels: Floats, distances: Sequence[float]) -> Flo
 def differences_at(a: Camera, b: Camera, fitted: Fitted, pixels: Floats, distance: float) -> Floats:
     """Return (n, 2) d(q) at (n, 2) pixels of camera a; NaN if not visible in both."""
     points = points_at(a, pixels, [distance])
-    moved = transformed(fitted.motion, points) if np.isfinite(distance) else points @ fitted.motion[:3, :3].T
-    return np.asarray(imaged(b, moved).xy - pixels)
+    return np.asarray(imaged(b, transformed(fitted.motion, points)).xy - pixels)
 
 
 def fitted_motion(

@@ -7,6 +7,7 @@ Exp(w) R, t <- t + dt.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,6 +71,11 @@ class Housing:
     def board(self) -> slice:
         """Rows of the unknowns of the board."""
         return slice(self.common - self.points_by_board.shape[2], self.common)
+
+    @cached_property
+    def fixing_corners(self) -> dict[int, Floats]:
+        """(6, p) T that fixes the observed corners of each camera, as far as computed."""
+        return {}
 
     def parameters(self, camera: int) -> slice:
         """Return the rows of a camera's parameters."""

@@ -8,7 +8,6 @@ T. It defines the motion tau = T db, (dt, w), of the camera axes for a change db
 from __future__ import annotations
 
 from typing import get_args
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -42,7 +41,11 @@ def datum_rows(
     found = np.zeros((6, housing.common + 6))
     own = housing.parameters(camera)
     if datum == "corners":
-        found[:, own] = _fixed_corners(housing, camera)
+        if camera not in (fixing := housing.fixing_corners):
+            places, sd = housing.places(camera)
+            weights = np.eye(2) / sd[:, np.newaxis, np.newaxis] ** 2
+            fixing[camera] = fixed_points(housing.cameras[camera], places, weights)
+        found[:, own] = fixing[camera]
     elif datum == "image" and fixed is not None:
         found[:, own] = fixed_points(housing.cameras[camera], *fixed)
     elif datum == "mean-frames":
@@ -54,20 +57,6 @@ def datum_rows(
         if camera:
             found[:, housing.sensor(camera)] = about
     return found
-
-
-_FIXED_CORNERS: WeakKeyDictionary[Housing, dict[int, Floats]] = WeakKeyDictionary()
-
-
-def _fixed_corners(housing: Housing, camera: int) -> Floats:
-    """Return (6, p) T that fixes the observed corners of a camera, cached."""
-    made = _FIXED_CORNERS.setdefault(housing, {})
-    if camera not in made:
-        places, sd = housing.places(camera)
-        made[camera] = fixed_points(
-            housing.cameras[camera], places, np.eye(2) / sd[:, np.newaxis, np.newaxis] ** 2
-        )
-    return made[camera]
 
 
 def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool = True) -> Floats:
