@@ -24,7 +24,7 @@ MARK = re.compile(r"^<!-- generated: (\w+) ?(.*?) ?-->$", re.MULTILINE)
 WIDTH = "500"  # Columns of the help, so that no line is wrapped
 CODE = 110  # Characters of a line of code on a page
 PANEL = re.compile(r"^╭─ (.*?) ─+╮\n(.*?)^╰", re.DOTALL | re.MULTILINE)
-VARIANT = re.compile(r"(\.one(\.\w+)?)?(\.cli)?$")
+VARIANT = re.compile(r"\.one(\.\w+)?$")
 FIELD = re.compile(r"\{(\w+)[^}]*\}")
 COUNTED = re.compile(r"\{\w+:[^/}]*/([^}]*)\}")  # Words for a count of one, and for others
 REMEDY = re.compile(
@@ -171,13 +171,14 @@ def sentences() -> dict[str, str]:
 
     A sentence for a count of one is omitted if there is one for other counts.
     """
-    from photogram.words import table_of
+    from photogram.words import READERS, table_of
 
     words = table_of("en")
     bases = {name: VARIANT.sub("", name) for name in words}
+    readers = {name: [READERS.sub(own, text) for own in (r"\1", r"\2")] for name, text in words.items()}
     return {
-        name: text + (f"{COMMAND}{words[f'{name}.cli']}" if f"{name}.cli" in words else "")
-        for name, text in words.items()
+        name: COMMAND.join(dict.fromkeys(readers[name]))
+        for name in words
         if bases[name] == name or bases[name] not in words
     }
 

@@ -8,10 +8,10 @@ A :class:`Phrase` is a code with fields until it is printed. Each language has o
   commas, and `#` for parts with numbers;
 * `^` for an initial capital letter, `+` for `; ` before a text that is not empty;
 * `one/several`, the words for a count of one and for other counts: `{n} {n:point/points}`;
+* of `cli`, the words for users of Python and for the command line, with their fields: `{cli:model/--model}`;
 * `'` for a quoted text of the input, escaped and shortened. Numbers, lists and phrases are not quoted.
 
-`code.one` is another sentence if the field `n` is 1, `code.one.name` if the field `name` is 1. `code.cli` is
-the sentence on the command line: it names options, the other one functions of Python.
+`code.one` is another sentence if the field `n` is 1, `code.one.name` if the field `name` is 1.
 """
 
 from __future__ import annotations
@@ -33,6 +33,7 @@ MAX_NAMES = 12  # Largest number of names in a list
 MAX_QUOTED = 40  # Largest number of characters of a field that a message quotes
 
 _on_command_line: ContextVar[bool] = ContextVar("on_command_line", default=False)
+READERS = re.compile(r"\{cli:((?:[^{}/]|\{[^{}]*\})*)/((?:[^{}]|\{[^{}]*\})*)\}")
 _SENTENCE = re.compile(r'^("\S.*?") = (".*")$', re.MULTILINE)
 
 
@@ -89,7 +90,7 @@ OPTIONS_OF_CONTROL = (Phrase("option.control"), Phrase("option.datum"))  # Optio
 
 @contextmanager
 def on_command_line() -> Iterator[None]:
-    """Use sentences that name command-line options instead of functions of Python."""
+    """Use words that name command-line options instead of functions of Python."""
     token = _on_command_line.set(True)
     try:
         yield
@@ -182,15 +183,14 @@ class Words:
         sentence = self._table.get(self._variant(code, fields))
         if sentence is None:  # Names of user-defined types of observations, units and components
             return code.partition(".")[2] or code
+        sentence = READERS.sub(r"\2" if _on_command_line.get() else r"\1", sentence)
         return "".join(
             text if name is None else text + self.text(fields.get(name, ""), form)
             for text, name, form in _parts(sentence)
         )
 
     def _variant(self, code: str, fields: Mapping[str, Any]) -> str:
-        """Return the code of the sentence for reader and counts."""
-        if _on_command_line.get() and f"{code}.cli" in self._table:
-            code = f"{code}.cli"
+        """Return the code of the sentence for the counts."""
         ones = [name for name, value in fields.items() if isinstance(value, int) and value == 1]
         # The singular of the first count leaves no other count in the sentence.
         for name in sorted(ones, key=lambda name: name != "n"):

@@ -12,7 +12,7 @@ from photogram.arguments.arrays import argument_error, one_of
 from photogram.errors import InputError
 from photogram.messages import unknown_name
 from photogram.show.page import fixed, probability_written
-from photogram.words import Words, phrase, table_of
+from photogram.words import READERS, Words, phrase, table_of
 
 LANGUAGES = ("en", "de")
 NOTHING = "–"  # Missing number
@@ -21,7 +21,7 @@ NOTHING = "–"  # Missing number
 def fields_of(sentence: str) -> set[str]:
     """Return the names of the fields of a sentence; refuse braces that are not closed."""
     try:
-        parts = list(Formatter().parse(sentence))
+        parts = list(Formatter().parse(READERS.sub(r"\1\2", sentence)))
     except ValueError as error:
         raise InputError(phrase("request.braces", sentence=sentence, reason=str(error))) from None
     return {name for _, name, _, _ in parts if name is not None}
@@ -47,7 +47,7 @@ class Texts(Words):
             if strange := fields_of(sentence) - known:
                 fields = {"field": sorted(strange)[0], "names": sorted(known)}
                 raise InputError(phrase("request.field", code=key, **fields))
-            parts = Formatter().parse(sentence)
+            parts = Formatter().parse(READERS.sub(r"\1\2", sentence))
             if any((form and "/" not in form) or conversion for *_, form, conversion in parts):
                 raise InputError(phrase("request.form", code=key, value=sentence))
         super().__init__(language, own)
