@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from photogram.comparator.case import exchanged
 from photogram.comparator.listing.parameters import table_nodes
 from photogram.comparator.pointing import CONFIDENCE_FACTORS
 from photogram.errors import InputError
+from photogram.plots.picture_data import VectorField
+from photogram.plots.residuals import vector_panel
+from photogram.show.quantity import Axis
 from photogram.show.sketch.marks import (
     Arrows,
     Ellipses,
@@ -81,35 +84,15 @@ def plotters(calibration: Calibration) -> dict[str, Callable[[], Plot]]:
 MAIN, ACCENT = BLUE, VERMILION
 MM = 1000.0
 PANELS_ACROSS = 4
+PLATE = tuple(Axis(f"{name} of the plate", "mm", small="µm", factor=MM) for name in "XY")
 OF_PLATE = ("X of the plate, mm", "Y of the plate, mm")
 OF_COMPARATOR = ("x, mm", "y, mm")
 
 
-class Field(NamedTuple):
-    """Vectors at points (n, 2), micrometres, with title and names of the axes."""
-
-    title: str
-    axes: tuple[str, str]
-    places_um: Floats
-    vectors_um: Floats
-    colour: str = MAIN
-
-
-def vector_plot(fields: Sequence[Field], side: float, title: str, *, same_limits: bool = False) -> Plot:
-    """Draw vector fields side by side on one scale; the longest vector defines it."""
-    every = np.vstack([field.vectors_um for field in fields])
-    longest = float(np.hypot(*every.T).max(initial=0.0))
-    scale = scale_of(fields[0].places_um / MM, longest, 0.9)
-    panels = []
-    for field in fields:
-        places = field.places_um / MM
-        arrows = Arrows(places, field.vectors_um * scale, field.colour, 0.006)
-        marks = [Markers(places, ".", 5.0, FAINT, layer=1.0), arrows]
-        shown = fields if same_limits else [field]
-        ends = [each.places_um / MM + each.vectors_um * scale for each in shown]
-        limits = around(np.vstack([*(each.places_um / MM for each in shown), *ends]))
-        panels.append(plan(limits, marks, field.title, field.axes, (scale, round_length(longest))))
-    return side_by_side(panels, PANELS_ACROSS, side, title)
+def vector_plot(fields: Sequence[VectorField], side: float, title: str) -> Plot:
+    """Draw vector fields side by side; the longest vector of all defines their scale."""
+    longest = max(float(np.hypot(*field.vectors.T).max(initial=0.0)) for field in fields)
+    return side_by_side([vector_panel(field, longest) for field in fields], PANELS_ACROSS, side, title)
 
 
 def residual_vectors(calibration: Calibration, *, in_grid: bool) -> Plot:
@@ -119,24 +102,24 @@ def residual_vectors(calibration: Calibration, *, in_grid: bool) -> Plot:
         title = f"case {case.number}, point {case.placed.orientation.nearest_point} nearest zero"
         own, hand = fit.residuals, case.placed.orientation.left_handed
         if in_grid:
-            vectors = exchanged(own.grid_um, hand)
-            fields.append(Field(title, OF_PLATE, exchanged(case.placed.grid_um, hand), vectors))
+            places, vectors = (exchanged(each, hand) / MM for each in (case.placed.grid_um, own.grid_um))
+            fields.append(VectorField(title, places, vectors, axes=PLATE))
         else:
-            fields.append(Field(title, OF_COMPARATOR, own.xy_um, own.comparator_um))
+            fields.append(VectorField(title, own.xy_um / MM, own.comparator_um / MM))
     system, target = ("grid", "grid") if in_grid else ("comparator", "measurement")
     title = f"Residuals in the {system} system (to be added to the {target})"
-    return vector_plot(fields, 3.4, title, same_limits=True)
+    return vector_plot(fields, 3.4, title)
 
 
 def average_vectors(calibration: Calibration, plate: int) -> Plot:
     """Draw average residuals by comparator location and by grid point, on one scale."""
     averages = calibration.plates[plate].averages
     grid = calibration.session.grids[plate]
-    title, places = "by grid point: correction of the grid", grid.xy_um[grid.rows_of(averages.points)]
-    fields = [Field(title, OF_PLATE, places, averages.corrections_um, ACCENT)]
+    title, places = "by grid point: correction of the grid", grid.xy_um[grid.rows_of(averages.points)] / MM
+    fields = [VectorField(title, places, averages.corrections_um / MM, axes=PLATE)]
     for place in averages.by_location:
         title = f"by comparator location, cases {', '.join(map(str, place.cases))}"
-        fields.append(Field(title, OF_COMPARATOR, place.xy_um, place.residuals_um))
+        fields.append(VectorField(title, place.xy_um / MM, place.residuals_um / MM))
     return vector_plot(fields, 4.2, f"Average residuals of {len(averages.cases)} cases, plate {plate}")
 
 

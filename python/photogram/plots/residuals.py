@@ -24,8 +24,8 @@ MIN_IMAGES = 8
 MARGIN = 0.06  # Around the frame, as a part of its longer side
 LONGEST_VECTOR = 2.5  # Multiple of the typical vector; longer vectors are cut short
 MAX_FIELDS = 6  # Of films
-MARGIN_OF_FIELD = 0.14  # Margin around the points of a film, as a part of their extent
-LONGEST_OF_FIELD = 0.11  # Its longest vector, as a part of the extent of the points
+MARGIN_OF_FIELD = 0.18  # Margin around the points of a film, as a part of their extent
+LONGEST_OF_FIELD = 0.17  # Its longest vector, as a part of the extent of the points
 LEVEL = 0.01  # Probability of a false alarm in any cell of a panel
 
 
