@@ -24,9 +24,7 @@ MARK = re.compile(r"^<!-- generated: (\w+) ?(.*?) ?-->$", re.MULTILINE)
 WIDTH = "500"  # Columns of the help, so that no line is wrapped
 CODE = 110  # Characters of a line of code on a page
 PANEL = re.compile(r"^╭─ (.*?) ─+╮\n(.*?)^╰", re.DOTALL | re.MULTILINE)
-VARIANT = re.compile(r"\.one(\.\w+)?$")
 FIELD = re.compile(r"\{(\w+)[^}]*\}")
-COUNTED = re.compile(r"\{\w+:[^/}]*/([^}]*)\}")  # Words for a count of one, and for others
 REMEDY = re.compile(
     r"(\(<var>option</var>[^)]*\)|(?<=[;.:,] )(?:(?:so|then|and) )?(?:"
     "add|adjust|assign|calibrate|change|check|choose|close|combine|compare|convert|copy|correct|count|create|define"
@@ -49,7 +47,7 @@ def cell(text: str) -> str:
     """Return text for a cell of an HTML table: backquotes are code, the fields of messages are variables."""
     text = FIELD.sub(
         lambda field: f"<var>{field[1].replace('_', ' ')}</var>",
-        escape(APPENDED.sub("; ", COUNTED.sub(r"\1", text)), quote=False),
+        escape(APPENDED.sub("; ", text), quote=False),
     )
     text = re.sub(r"`([^`]+)`", r"<code>\1</code>", text)
     return text.replace(COMMAND, "<br><em>On the command line:</em> ")
@@ -167,19 +165,17 @@ def commands(_: str) -> str:
 
 
 def sentences() -> dict[str, str]:
-    """Return the sentence of each message by code, with that of the command line if it has one.
+    """Return the sentence of each message by code, for counts of several, and that of the command line."""
+    from photogram.words import CHOICE, table_of
 
-    A sentence for a count of one is omitted if there is one for other counts.
-    """
-    from photogram.words import READERS, table_of
+    def chosen(text: str, reader: int) -> str:
+        while CHOICE.search(text):
+            text = CHOICE.sub(lambda found: found[reader if found[1] == "cli" else 3], text)
+        return text
 
-    words = table_of("en")
-    bases = {name: VARIANT.sub("", name) for name in words}
-    readers = {name: [READERS.sub(own, text) for own in (r"\1", r"\2")] for name, text in words.items()}
     return {
-        name: COMMAND.join(dict.fromkeys(readers[name]))
-        for name in words
-        if bases[name] == name or bases[name] not in words
+        name: COMMAND.join(dict.fromkeys(chosen(text, reader) for reader in (2, 3)))
+        for name, text in table_of("en").items()
     }
 
 

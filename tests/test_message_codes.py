@@ -38,7 +38,7 @@ def test_forms_of_fields():
     own = Words("en", {
         "a.number": "{n:.3g}", "a.list": "{names:2}", "a.numbered": "{names:#}", "a.or": "{names:|}",
         "a.parts": "before{parts:+;}", "a.capital": "{name:^}",
-        "a.count": "{n} points", "a.count.one": "{n} point",
+        "a.named": "{n:the point {names}/{n} points in {files} {files:file/files}}",
         "a.counted": "{n} {n:point is/points are} missing",
     })  # fmt: skip
     assert own("a.number", n=2 / 3) == "0.667"
@@ -48,7 +48,8 @@ def test_forms_of_fields():
     assert own("a.parts", parts=[]) == "before"
     assert own("a.parts", parts=["x", Phrase("named.photo", {"photo": "3"})]) == "before; x; photo 3"
     assert own("a.capital", name=Phrase("named.photo", {"photo": "3"})) == "Photo 3"
-    assert (own("a.count", n=1), own("a.count", n=2)) == ("1 point", "2 points")
+    assert own("a.named", n=1, files=1, names=["A"]) == "the point A"
+    assert own("a.named", n=2, files=3, names=["A", "B"]) == "2 points in 3 files"
     assert own("a.counted", n=1) == "1 point is missing"
     assert own("a.counted", n=2) == "2 points are missing"
     assert Words("de")("part.factor", factor=1.5, low=1.25, high=2.0) == "1,5 (95 Prozent: 1,25 bis 2)"
@@ -100,13 +101,12 @@ def test_every_code_has_a_sentence_and_every_sentence_is_printed():
     strings = set().union(*(each[0] for each in files))
     patterns = [re.compile(pattern) for each in files for pattern in each[1]]
     sentences = table_of("en").keys()
-    base = {code: re.sub(r"\.one(\.\w+)?$", "", code) for code in sentences}
-    assert set().union(*(each[2] for each in files)) <= sentences | set(base.values())
+    assert set().union(*(each[2] for each in files)) <= sentences
 
     def is_printed(code):
         return code in strings or any(pattern.fullmatch(code) for pattern in patterns)
 
-    unused = [code for code in sentences if not (is_printed(code) or is_printed(base[code]))]
+    unused = [code for code in sentences if not is_printed(code)]
     assert [code for code in unused if not code.startswith(FROM_DATA)] == []
 
 

@@ -8,10 +8,10 @@ A :class:`Phrase` is a code with fields until it is printed. Each language has o
   commas, and `#` for parts with numbers;
 * `^` for an initial capital letter, `+` for `; ` before a text that is not empty;
 * `one/several`, the words for a count of one and for other counts: `{n} {n:point/points}`;
-* of `cli`, the words for users of Python and for the command line, with their fields: `{cli:model/--model}`;
+* of `cli`, the words for users of Python and for the command line: `{cli:model/--model}`;
 * `'` for a quoted text of the input, escaped and shortened. Numbers, lists and phrases are not quoted.
 
-`code.one` is another sentence if the field `n` is 1, `code.one.name` if the field `name` is 1.
+Words before and after a slash may contain fields: `{n:the point {name}/{n} points}`.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ MAX_NAMES = 12  # Largest number of names in a list
 MAX_QUOTED = 40  # Largest number of characters of a field that a message quotes
 
 _on_command_line: ContextVar[bool] = ContextVar("on_command_line", default=False)
-READERS = re.compile(r"\{cli:((?:[^{}/]|\{[^{}]*\})*)/((?:[^{}]|\{[^{}]*\})*)\}")
+CHOICE = re.compile(r"\{(\w+):((?:[^{}/]|\{[^{}]*\})*)/((?:[^{}]|\{[^{}]*\})*)\}")
 _SENTENCE = re.compile(r'^("\S.*?") = (".*")$', re.MULTILINE)
 
 
@@ -117,6 +117,17 @@ def words_of(language: str) -> Words:
     return Words(language)
 
 
+def _chosen(sentence: str, fields: Mapping[str, Any]) -> str:
+    """Return a sentence with the words for its reader and its counts."""
+
+    def words(found: re.Match[str]) -> str:
+        of_python = not _on_command_line.get()
+        first = of_python if found[1] == "cli" else fields.get(found[1]) == 1
+        return _chosen(found[2 if first else 3], fields)
+
+    return CHOICE.sub(words, sentence)
+
+
 @cache
 def _parts(sentence: str) -> list[tuple[str, str | None, str]]:
     """Return the texts of a sentence, each with the following field and its form."""
@@ -137,17 +148,13 @@ class Words:
     def __init__(self, language: str = "en", own: Mapping[str, str] | None = None) -> None:
         self.language = language
         self._table = {**table_of("en"), **table_of(language), **(own or {})}
-        self._own = own or {}
 
     def __call__(self, code: str, **fields: Any) -> str:
         """Return the sentence of a code with its fields."""
         return self._composed(code, fields)
 
     def text(self, value: Any, form: str = "") -> str:
-        """Return a phrase, a list, a number or a text in the language, or words for a count."""
-        one, slash, several = form.partition("/")
-        if slash:
-            return one if value == 1 else several
+        """Return a phrase, a list, a number or a text in the language."""
         if isinstance(value, Phrase):
             text = self._composed(value.code, value.fields)
         elif isinstance(value, list | tuple):
@@ -180,25 +187,13 @@ class Words:
         return written.replace(".", self._table["number.decimal"])
 
     def _composed(self, code: str, fields: Mapping[str, Any]) -> str:
-        sentence = self._table.get(self._variant(code, fields))
+        sentence = self._table.get(code)
         if sentence is None:  # Names of user-defined types of observations, units and components
             return code.partition(".")[2] or code
-        sentence = READERS.sub(r"\2" if _on_command_line.get() else r"\1", sentence)
         return "".join(
             text if name is None else text + self.text(fields.get(name, ""), form)
-            for text, name, form in _parts(sentence)
+            for text, name, form in _parts(_chosen(sentence, fields))
         )
-
-    def _variant(self, code: str, fields: Mapping[str, Any]) -> str:
-        """Return the code of the sentence for the counts."""
-        ones = [name for name, value in fields.items() if isinstance(value, int) and value == 1]
-        # The singular of the first count leaves no other count in the sentence.
-        for name in sorted(ones, key=lambda name: name != "n"):
-            variant = f"{code}.one" if name == "n" else f"{code}.one.{name}"
-            # A user-defined sentence applies to every count.
-            if variant in self._own or (variant in self._table and code not in self._own):
-                return variant
-        return code
 
     def _list(self, values: Sequence[Any], form: str) -> str:
         parts = [self.text(each) for each in values]

@@ -12,7 +12,7 @@ from photogram.arguments.arrays import argument_error, one_of
 from photogram.errors import InputError
 from photogram.messages import unknown_name
 from photogram.show.page import fixed, probability_written
-from photogram.words import READERS, Words, phrase, table_of
+from photogram.words import CHOICE, Words, phrase, table_of
 
 LANGUAGES = ("en", "de")
 NOTHING = "–"  # Missing number
@@ -20,11 +20,19 @@ NOTHING = "–"  # Missing number
 
 def fields_of(sentence: str) -> set[str]:
     """Return the names of the fields of a sentence; refuse braces that are not closed."""
+    return {name for name, _ in _forms_of(sentence)} - {"cli"}
+
+
+def _forms_of(sentence: str) -> list[tuple[str, str]]:
+    """Return the fields with their forms, and the counts that choose words."""
+    words = sentence
+    while CHOICE.search(words):
+        words = CHOICE.sub(r"{\1}\2\3", words)
     try:
-        parts = list(Formatter().parse(READERS.sub(r"\1\2", sentence)))
+        parts = list(Formatter().parse(words))
     except ValueError as error:
         raise InputError(phrase("request.braces", sentence=sentence, reason=str(error))) from None
-    return {name for _, name, _, _ in parts if name is not None}
+    return [(name, form or conversion or "") for _, name, form, conversion in parts if name is not None]
 
 
 class Texts(Words):
@@ -35,20 +43,17 @@ class Texts(Words):
         self.language, self.unit = language, unit
         english = table_of("en")
         for key, sentence in (own or {}).items():
-            # Sentences of a firm may have another form for a count of one.
-            sentence_of = english.get(key) or english.get(key.partition(".one")[0])
-            if sentence_of is None:
+            if key not in english:
                 alike = [code for code in english if code.partition(".")[0] == key.partition(".")[0]]
                 absent = phrase("error.absent", kind="code", name=key)
                 raise InputError(unknown_name("code", key, alike) if alike else absent)
             if not isinstance(sentence, str):
                 raise argument_error(key, "text", value=sentence)
-            known = fields_of(sentence_of)
+            known = fields_of(english[key])
             if strange := fields_of(sentence) - known:
                 fields = {"field": sorted(strange)[0], "names": sorted(known)}
                 raise InputError(phrase("request.field", code=key, **fields))
-            parts = Formatter().parse(READERS.sub(r"\1\2", sentence))
-            if any((form and "/" not in form) or conversion for *_, form, conversion in parts):
+            if any(form for _, form in _forms_of(sentence)):
                 raise InputError(phrase("request.form", code=key, value=sentence))
         super().__init__(language, own)
         own = table_of(language)
