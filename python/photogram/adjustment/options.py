@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
     from photogram.network.datum import InnerConstraints, MinimumConstraints
 
-__all__ = ["AdjustOptions", "AsPublished", "DatumName", "Ordering", "UnitVariance"]
-
 DatumName = Literal["control", "minimum", "inner"]
 UnitVariance = Literal["free", "constrained", "unity", "redundancy"]
 CurrentVariance = Literal["constrained", "unity", "redundancy"]  # Without the default of the 1987 program

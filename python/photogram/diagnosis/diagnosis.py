@@ -16,8 +16,6 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.results.result import Result
 
-__all__ = ["Diagnosis"]
-
 CONVENTIONS = frozenset(
     {
         "mirrored",

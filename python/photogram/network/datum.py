@@ -12,15 +12,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, position_columns
 from photogram.words import phrase
 
-__all__ = [
-    "DatumRow",
-    "InnerConstraints",
-    "MinimumConstraints",
-    "check_datum",
-    "datum_row",
-    "minimum_row",
-]
-
 DatumRow = tuple[str, list[int], list[int], bool, list[int], float | None]
 """`inner` or `relative`, points, photos, use of scale, photos with attitudes, radius."""
 

@@ -25,8 +25,6 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram import Block
 
-__all__ = ["LineSensor", "Lines", "Moment", "Shutter", "Timed", "checked_timed", "own_trajectories"]
-
 Direction = Literal["down", "up", "right", "left"]
 
 STEPS = 100

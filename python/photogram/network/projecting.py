@@ -20,8 +20,6 @@ from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown
 from photogram.words import phrase
 
-__all__ = ["camera_of", "projected", "projected_images", "standing"]
-
 Values = Callable[[Unknown], tuple[Floats, Floats]]  # Position and rotation of a shared unknown
 
 STEPS = 200

@@ -13,8 +13,6 @@ from photogram.words import Phrase
 if TYPE_CHECKING:
     from photogram._photocore import RefractionRow
 
-__all__ = ["METRES_PER_UNIT", "Air", "Refraction", "Water", "metres_per_unit"]
-
 Air = Literal["giant", "standard"]
 Water = Literal["giant", "snell"]
 

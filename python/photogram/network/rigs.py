@@ -12,8 +12,6 @@ from photogram.network.moving_photos import Timed, require_photos
 from photogram.network.unknowns import Sensor, Unknown
 from photogram.words import phrase
 
-__all__ = ["Mount", "MountRow", "checked_mounts", "mount_rows"]
-
 MountRow = tuple[int, int, int]
 """Indices of a photo, of the photo that represents its frame, and of its sensor among the unknowns."""
 

@@ -21,8 +21,6 @@ from photogram.network.simulated_layout import Layout
 from photogram.network.simulation_options import GUSTS, RollingShutter
 from photogram.network.trajectories import Readout
 
-__all__ = ["photo_angles", "rolled", "rotations_of"]
-
 _STARTS = 0.5  # Initial value of an unknown readout time, relative to the true one
 
 

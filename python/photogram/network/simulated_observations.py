@@ -28,8 +28,6 @@ from photogram.network.simulation import Simulation
 from photogram.network.unknowns import Boresight, Drift, Instrument, LeverArm, Sensor, Shift
 from photogram.words import phrase
 
-__all__ = ["with_distances", "with_gnss", "with_inertial", "with_rig"]
-
 
 def with_gnss(
     simulation: Simulation,

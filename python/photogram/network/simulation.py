@@ -35,9 +35,6 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram.network.keywords import SimulationKeywords
 
-__all__ = ["Blunders", "Simulation", "simulate"]
-
-
 _NARROWEST, _WIDEST = 1e-6, 1.4
 """Limits of the viewing angle from the vertical, radians; a wider view is too far away to simulate."""
 _FAR_MORE = 10.0  # Maximum lateral distance relative to the range of view

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from photogram.network.refraction import Refraction
     from photogram.network.trajectories import Polynomial, Spline
 
-__all__ = ["GUSTS", "LONGEST", "LineScanner", "RollingShutter", "SimulationOptions"]
-
 ControlPattern = Literal["perimeter", "corners", "none"]
 
 LONGEST = 1e12  # Largest length of a block, metres

@@ -15,8 +15,6 @@ from photogram.arguments.types import Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 
-__all__ = ["FEWEST_TIES", "Overflow", "Structure", "structure", "ties"]
-
 FEWEST_TIES = 3  # Minimum number of points for the orientation of a photo
 
 

@@ -26,17 +26,6 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.unknowns import ROTATION, Numbers, Unknown, are_rotations
 from photogram.words import phrase
 
-__all__ = [
-    "Clock",
-    "Coefficient",
-    "GyroBias",
-    "Polynomial",
-    "Readout",
-    "Spline",
-    "Table",
-    "Trajectory",
-]
-
 Interpolation = Literal["linear", "hermite", "lagrange"]
 AttitudeInterpolation = Literal["linear", "lagrange"]
 PositionAxes = Literal["table", "orbit", "flight"]

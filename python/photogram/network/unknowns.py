@@ -22,24 +22,6 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.words import phrase
 
-__all__ = [
-    "Boresight",
-    "Drift",
-    "Instrument",
-    "Level",
-    "LeverArm",
-    "Line",
-    "Numbers",
-    "Plane",
-    "PlumbLine",
-    "Sensor",
-    "Shift",
-    "Unknown",
-    "UnknownRow",
-    "different_unknowns",
-    "rotation",
-]
-
 UnknownRow = tuple[str, list[float], list[float], list[float]]
 """Type, position, rotation matrix row by row, and standard deviations: the row of an unknown for the core."""
 

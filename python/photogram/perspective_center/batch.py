@@ -18,8 +18,6 @@ from photogram.show.methods import Documented
 from photogram.show.page import Document, Judgement
 from photogram.words import phrase
 
-__all__ = ["Run", "Stop", "run_deck"]
-
 
 @dataclass(frozen=True)
 class Stop:

@@ -14,9 +14,6 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.summaries import Brief
 from photogram.words import phrase
 
-__all__ = ["MINUTES_PER_RADIAN", "Coordinatograph", "Grid", "joined", "reduce", "single"]
-
-
 MINUTES_PER_RADIAN = 3437.7468  # CONV of the program, too large by 8.5e-9
 
 

@@ -7,8 +7,6 @@ from typing import Literal
 from photogram.arguments.fields import Checked, option
 from photogram.lazy_dataclasses import dataclass
 
-__all__ = ["SnoopOptions"]
-
 UnitWeight = Literal["known", "unknown"]
 
 

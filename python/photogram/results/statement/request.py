@@ -17,8 +17,6 @@ from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.results.components import VarianceComponents
 from photogram.words import phrase
 
-__all__ = ["INDEPENDENT", "METRES", "STANDARDS", "Asked", "invalid", "length_of", "lengths_in"]
-
 STANDARDS = ("plain", "asprs-2023", "nssda", "vdi-2634", "iso-19157")
 INDEPENDENT = ("yes", "same-base", "no")  # Independence of the survey of check points from the block
 METRES = {"mm": 1e-3, "cm": 1e-2, "dm": 1e-1, "m": 1.0, "km": 1e3, "in": 0.0254, "ft": 0.3048}
