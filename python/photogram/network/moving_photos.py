@@ -350,14 +350,11 @@ def _uniform(block: Block, own: Timed, row: int) -> Trajectory:
     form = angles_form(block.photo_to_ground)
     attitude = Attitudes.of(form, block.photo_attitudes[[row]]).matrices
     table = Table(np.array([time]), place[np.newaxis], np.array([time]), attitude)
-    shape = (3,)
-    values = [np.zeros(3), shaped("velocity", own.velocity, shape)]
-    turns = [np.zeros(3), shaped("rotation_rate", own.rotation_rate, shape)]
-    sd = [sd_position, shaped("sd_velocity", own.sd_velocity, shape)]
-    sd_turn = [sd_attitude, shaped("sd_rate", own.sd_rate, shape)]
+    values, turns = (np.array([np.zeros(3), each]) for each in (own.velocity, own.rotation_rate))
+    sd, sd_turn = np.array([sd_position, own.sd_velocity]), np.array([sd_attitude, own.sd_rate])
     return Trajectory(
         own.photo,
         table,
-        position=Polynomial(1, time, 1.0, np.array(values), np.array(sd)),
-        rotation=Polynomial(1, time, 1.0, np.array(turns), np.array(sd_turn)),
+        position=Polynomial(1, time, 1.0, values, sd),
+        rotation=Polynomial(1, time, 1.0, turns, sd_turn),
     )
