@@ -7,15 +7,12 @@ use photocore::adjustment::{self, Method, Status, Stop};
 use photocore::geometry::{ObjectSpace, Orientation, Perspective, Point as At, PoseNumbers, RotationSense};
 use photocore::network::{Camera, Coarse, Image, Network, NetworkError, Options, Photo, Point, Solution};
 
+use crate::noise;
+
 const FREE: [f64; 3] = [f64::INFINITY; 3];
 const CAMERA: Perspective = Perspective { principal_distance: -150.0 };
 const POSES: PoseNumbers = PoseNumbers::Angles(RotationSense::GroundToPhoto);
 const SD: f64 = 0.005;
-
-/// Returns deterministic noise from incommensurable angles.
-fn noise(index: usize) -> f64 {
-    (1.7 * index as f64 * index as f64 + 0.3).sin()
-}
 
 /// Returns a free photo with the given pose; photos look down from 1500 m.
 fn photo(position: [f64; 3], attitude: [f64; 3]) -> Photo {
@@ -74,13 +71,8 @@ fn sound() -> Network {
 }
 
 fn adjust(block: &Network) -> Result<Solution, NetworkError> {
-    let adjustment = adjustment::Options {
-        method: Method::Damped(Stop::Fraction(1e-6)),
-        max_iterations: 100,
-        covariance: true,
-        loss: None,
-        threads: 0,
-    };
+    let adjustment =
+        adjustment::Options { method: Method::Damped(Stop::Fraction(1e-6)), ..Default::default() };
     let options = Options { adjustment, ..Options::default() };
     let threads = Threads::new(1).unwrap();
     block.adjustment(&options).on(&threads).run()

@@ -12,13 +12,10 @@ use photocore::geometry::{
 };
 use photocore::network::{Camera, Image, Network, NetworkError, Options, Photo, Point, Solution};
 
+use crate::noise;
+
 const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
 const SD: f64 = 0.002;
-
-/// Returns deterministic noise from incommensurable angles.
-fn noise(index: usize) -> f64 {
-    (1.7 * index as f64 * index as f64 + 0.3).sin()
-}
 
 /// Returns the axes x right, y up, z backward of a photo at `from` that looks at `to`.
 fn looking(from: Vector3, to: Vector3, up: Vector3) -> Matrix3 {

@@ -10,11 +10,11 @@ use photocore::geometry::{
     angle_axis_with_jacobian,
 };
 use photocore::network::{
-    AdjustedPhoto, Camera, Coarse, Image, Network, NetworkError, Options, Photo, Point, Screens, Solution,
-    Start, UnitVariance,
+    AdjustedPhoto, Camera, Coarse, Image, Network, NetworkError, Options, Photo, Point, Solution, Start,
 };
-use photocore::normals::Ordering;
 use proptest::prelude::*;
+
+use crate::noise;
 
 /// Returns the rotated vector by the exponential series of the cross product, independent of closed forms.
 fn turned(w: [C; 3], v: [C; 3]) -> [C; 3] {
@@ -107,11 +107,6 @@ fn the_rotation_is_orthogonal_and_turns_by_the_angle() {
     }
 }
 
-/// Returns deterministic noise from incommensurable angles.
-fn noise(index: usize) -> f64 {
-    (1.7 * index as f64 * index as f64 + 0.3).sin()
-}
-
 /// Returns photos around a cloud of points; initial values are wrong by `coarseness`.
 fn collection(photos: usize, points: usize, coarseness: f64) -> Network {
     let parameters = |i: usize| -> [f64; 9] {
@@ -177,22 +172,10 @@ fn adjusted_from(
     let adjustment = adjustment::Options {
         method: Method::TrustRegion(Stop::Decrease(1e-10)),
         max_iterations: 200,
-        covariance: true,
         loss,
-        threads: 0,
+        ..Default::default()
     };
-    let options = Options {
-        adjustment,
-        ordering: Ordering::Auto,
-        unit_variance: UnitVariance::Constrained,
-        start,
-        hold_unused: true,
-        memory: None,
-        reserved: 0,
-        minimum: None,
-        screens: Screens::default(),
-        photo_corrections: false,
-    };
+    let options = Options { adjustment, start, hold_unused: true, ..Options::default() };
     collection.adjustment(&options).on(&threads).run()
 }
 

@@ -17,21 +17,14 @@ use photocore::network::{
     Solution, Start,
 };
 
+use crate::{noise, noises};
+
 const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
 const SD: f64 = 0.002;
 const FREE: f64 = f64::INFINITY;
 const NUMBERS: AttitudeNumbers = AttitudeNumbers::OmegaPhiKappa(RotationSense::GroundToPhoto);
 const PHOTOS: usize = 6;
 const POINTS: usize = 12;
-
-/// Returns deterministic noise from incommensurable angles.
-fn noise(index: usize) -> f64 {
-    (1.7 * index as f64 * index as f64 + 0.3).sin()
-}
-
-fn noises(index: usize) -> Vector3 {
-    Vector3::from([3 * index, 3 * index + 1, 3 * index + 2].map(noise))
-}
 
 /// Returns photos on a circle about free points; the third sees one point fewer than the others, the second all.
 fn around() -> Network {

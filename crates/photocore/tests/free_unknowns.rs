@@ -17,20 +17,13 @@ use photocore::network::{
     Observation, Options, Photo, Point, Precision, Solution,
 };
 
+use crate::{noise, noises};
+
 const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
 const SD: f64 = 0.002;
 const FREE: f64 = f64::INFINITY;
 const NUMBERS: AttitudeNumbers = AttitudeNumbers::OmegaPhiKappa(RotationSense::GroundToPhoto);
 const POINTS: usize = 14;
-
-/// Returns deterministic noise from incommensurable angles.
-fn noise(index: usize) -> f64 {
-    (1.7 * index as f64 * index as f64 + 0.3).sin()
-}
-
-fn noises(index: usize) -> Vector3 {
-    Vector3::from([3 * index, 3 * index + 1, 3 * index + 2].map(noise))
-}
 
 /// Returns the observations of points on photos with the given poses, with errors of `errors` standard deviations.
 fn network(poses: &[Pose], places: &[Vector3], errors: f64) -> Network {

@@ -4,6 +4,8 @@
 
 use std::fs;
 
+use photocore::geometry::Vector3;
+
 mod adjustment;
 mod attitudes;
 mod block;
@@ -29,6 +31,20 @@ mod slow_steps;
 mod splined_camera;
 mod ties;
 mod trajectories;
+
+/// Returns deterministic noise from incommensurable angles.
+fn noise(index: usize) -> f64 {
+    (1.7 * index as f64 * index as f64 + 0.3).sin()
+}
+
+/// Returns a reproducible number between -1 and 1 for each index.
+fn scatter(index: usize) -> f64 {
+    ((index as f64 * 12.9898).sin() * 43758.5453).fract()
+}
+
+fn noises(index: usize) -> Vector3 {
+    Vector3::from([3 * index, 3 * index + 1, 3 * index + 2].map(noise))
+}
 
 /// This file, and separate programs: a table for the page, global threads of the process.
 const OTHERS: [&str; 2] = ["main", "nist"];

@@ -22,17 +22,14 @@ use photocore::network::{
     Point, Precision, Reason, Solution,
 };
 
+use crate::scatter;
+
 const SENSE: RotationSense = RotationSense::GroundToPhoto;
 const PRINCIPAL_DISTANCE: f64 = -50.0;
 const IMAGE_SD: f64 = 0.002;
 const PHOTOS: usize = 5;
 const POINTS: usize = 14;
 const FREE: [f64; 3] = [f64::INFINITY; 3];
-
-/// Returns a reproducible number between -1 and 1 for each index.
-fn noise(index: usize) -> f64 {
-    ((index as f64 * 12.9898).sin() * 43758.5453).fract()
-}
 
 /// Point 9 is above point 8, and points 10 to 12 are collinear.
 fn place(k: usize) -> [f64; 3] {
@@ -41,17 +38,17 @@ fn place(k: usize) -> [f64; 3] {
         9 => along(8, [0.0, 0.0, 0.7]),
         11 => along(10, [0.2, -0.4, 0.3]),
         12 => along(10, [-0.3, 0.6, -0.45]),
-        _ => [0, 1, 2].map(|i| [500.0, 800.0, 20.0][i] + 1.2 * noise(7 * k + i)),
+        _ => [0, 1, 2].map(|i| [500.0, 800.0, 20.0][i] + 1.2 * scatter(7 * k + i)),
     }
 }
 
 /// Returns photos in an arc of 5 m about the object, towards its centre.
 fn pose(k: usize) -> [f64; 6] {
     let turn = 0.5 * (k as f64 - 2.0);
-    let back = Vector3::new(turn.sin(), -turn.cos(), 0.3 + 0.1 * noise(k)).normalize();
+    let back = Vector3::new(turn.sin(), -turn.cos(), 0.3 + 0.1 * scatter(k)).normalize();
     let right = Vector3::new(-back.y, back.x, 0.0).normalize();
     let up = back.cross(&right);
-    let roll = rotation([0.0, 0.0, 1.2 * noise(30 + k)]);
+    let roll = rotation([0.0, 0.0, 1.2 * scatter(30 + k)]);
     let attitude = Matrix3::from_columns(&[right, up, back]) * roll;
     let [x, y, z]: [f64; 3] = (Vector3::new(500.0, 800.0, 20.0) + 5.0 * back).into();
     let [omega, phi, kappa] = AttitudeNumbers::OmegaPhiKappa(SENSE).numbers(&attitude);
@@ -69,7 +66,7 @@ fn position(pose: &[f64; 6]) -> Vector3 {
 /// Returns a full covariance matrix of components with the given standard deviations.
 fn covariance(sd: &[f64]) -> Precision {
     let n = sd.len();
-    let entry = |i: usize, j: usize| sd[i] * sd[j] * if i == j { 1.0 } else { 0.3 * noise(11 * (i + j)) };
+    let entry = |i: usize, j: usize| sd[i] * sd[j] * if i == j { 1.0 } else { 0.3 * scatter(11 * (i + j)) };
     Precision::Covariance(nalgebra::DMatrix::from_fn(n, n, entry))
 }
 
@@ -87,12 +84,12 @@ fn images_alone() -> Network {
             let seen = geometry::View::new(space, SENSE, [x, y, z], attitude, PRINCIPAL_DISTANCE);
             let exact = seen.project(&geometry::Point::new(space, place(point)));
             let at = 500 + 2 * images.len();
-            let xy = [0, 1].map(|k| exact[k] + IMAGE_SD * noise(at + k));
+            let xy = [0, 1].map(|k| exact[k] + IMAGE_SD * scatter(at + k));
             images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
         }
     }
     let photo = |k: usize| {
-        let start = std::array::from_fn(|i| pose(k)[i] + 0.01 * noise(900 + 6 * k + i));
+        let start = std::array::from_fn(|i| pose(k)[i] + 0.01 * scatter(900 + 6 * k + i));
         Photo { pose: start, observed: start, sd: [f64::INFINITY; 6], camera: 0 }
     };
     Network {
@@ -117,7 +114,7 @@ fn difference(a: usize, b: usize) -> Vector3 {
 }
 
 fn distance(a: usize, b: usize) -> Observation {
-    let length = difference(a, b).norm() + 1e-3 * noise(a);
+    let length = difference(a, b).norm() + 1e-3 * scatter(a);
     Distance { points: [a, b], length, sd: 1e-3, instrument: None }.into()
 }
 
@@ -127,25 +124,25 @@ fn network() -> Network {
     network.points[2] = Point { coordinates: place(2), sd: [0.002, 0.0, 0.003] };
     network.points[11] = Point { coordinates: place(11), sd: [f64::INFINITY, 0.004, f64::INFINITY] };
     let control = |point: usize| {
-        let coordinates = std::array::from_fn(|k| place(point)[k] + 0.002 * noise(70 + point + k));
+        let coordinates = std::array::from_fn(|k| place(point)[k] + 0.002 * scatter(70 + point + k));
         Control { point, coordinates, precision: covariance(&[0.002, 0.003, 0.002]) }.into()
     };
     let lever_arm = Vector3::new(0.1, -0.3, 0.2);
     let gnss = |photo: usize, precision: Precision| {
         let antenna = position(&pose(photo)) + attitude(&pose(photo)) * lever_arm;
-        let coordinates = std::array::from_fn(|k| antenna[k] + 0.01 * noise(80 + photo + k));
+        let coordinates = std::array::from_fn(|k| antenna[k] + 0.01 * scatter(80 + photo + k));
         Position::new(photo, coordinates, lever_arm, precision).into()
     };
     let imu = |photo: usize, precision: Precision| {
         let boresight = rotation([1.5, 0.1, -0.4]);
-        let error = rotation([0, 1, 2].map(|k| 1e-3 * noise(90 + 3 * photo + k)));
+        let error = rotation([0, 1, 2].map(|k| 1e-3 * scatter(90 + 3 * photo + k)));
         let attitude = attitude(&pose(photo)) * boresight * error;
         Attitude { photo, attitude, boresight: Quantity::Known(boresight), precision }.into()
     };
     let relative = |i: usize, j: usize| {
         let (a, b) = (pose(i), pose(j));
-        let error = Vector3::from([0, 1, 2].map(|k| 2e-3 * noise(110 + k)));
-        let turned = rotation([0, 1, 2].map(|k| 5e-4 * noise(120 + k)));
+        let error = Vector3::from([0, 1, 2].map(|k| 2e-3 * scatter(110 + k)));
+        let turned = rotation([0, 1, 2].map(|k| 5e-4 * scatter(120 + k)));
         let pose = Pose {
             position: attitude(&a).tr_mul(&(position(&b) - position(&a))) + error,
             attitude: attitude(&a).transpose() * attitude(&b) * turned,
@@ -155,14 +152,14 @@ fn network() -> Network {
     };
     let range = |photo: usize, point: usize| {
         let from = position(&pose(photo)) + attitude(&pose(photo)) * lever_arm;
-        let length = (Vector3::from(place(point)) - from).norm() + 1e-3 * noise(150 + photo);
+        let length = (Vector3::from(place(point)) - from).norm() + 1e-3 * scatter(150 + photo);
         Range { photo, point, length, sd: 1e-3, lever_arm, instrument: None }
     };
     let components = |a, b, seen: [bool; 3]| {
-        std::array::from_fn(|k| seen[k].then(|| difference(a, b)[k] + 1e-3 * noise(130 + k)))
+        std::array::from_fn(|k| seen[k].then(|| difference(a, b)[k] + 1e-3 * scatter(130 + k)))
     };
     let level = |a: usize, b: usize| {
-        EqualHeight { points: [a, b], difference: difference(a, b)[2] + 1e-3 * noise(140 + a), sd: 1e-3 }
+        EqualHeight { points: [a, b], difference: difference(a, b)[2] + 1e-3 * scatter(140 + a), sd: 1e-3 }
             .into()
     };
     network.observations = vec![
@@ -271,7 +268,7 @@ fn with_commons(network: &mut Network) {
         network.photos.push(Photo { pose, observed: pose, ..free });
     }
     for (photo, point) in MOUNTED.iter().flat_map(|&photo| (0..POINTS).map(move |point| (photo, point))) {
-        let xy = [0, 1].map(|k| imaged(photo, point)[k] + IMAGE_SD * noise(1500 + 29 * point + k));
+        let xy = [0, 1].map(|k| imaged(photo, point)[k] + IMAGE_SD * scatter(1500 + 29 * point + k));
         network.images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
     }
     let mount = |k: usize| OnFrame { photo: MOUNTED[k], frame: FRAMES[k], sensor: SENSOR }.into();
@@ -286,7 +283,8 @@ fn with_commons(network: &mut Network) {
     };
     let given = |(common, &kind): (usize, &CommonKind)| {
         let Pose { position, attitude } = truth(common);
-        let small = |first: usize, size: f64| [0, 1, 2].map(|k| size * noise(1600 + 10 * common + first + k));
+        let small =
+            |first: usize, size: f64| [0, 1, 2].map(|k| size * scatter(1600 + 10 * common + first + k));
         let turns = kind.unknowns().iter().any(|&(_, component, _)| component > 2);
         let size = if kind == CommonKind::Drift || kind == CommonKind::Instrument { 0.001 } else { 0.01 };
         let attitude = if turns { attitude * rotation(small(3, 0.02)) } else { attitude };
@@ -302,7 +300,7 @@ fn with_commons(network: &mut Network) {
 }
 
 fn of_commons() -> Vec<Observation> {
-    let error = |size: f64, at: usize| size * noise(1800 + at);
+    let error = |size: f64, at: usize| size * scatter(1800 + at);
     let gnss = |photo: usize, time: f64| -> Observation {
         let Pose { position, attitude } = seen(photo);
         let antenna = position
@@ -893,7 +891,7 @@ fn any_number_of_threads_gives_the_same_bits() {
 fn of_single_points(connected: bool) -> Network {
     let mut network = images_alone();
     let control = |point: usize| -> Observation {
-        let coordinates = std::array::from_fn(|k| place(point)[k] + 0.002 * noise(70 + point + k));
+        let coordinates = std::array::from_fn(|k| place(point)[k] + 0.002 * scatter(70 + point + k));
         Control { point, coordinates, precision: covariance(&[0.002, 0.003, 0.002]) }.into()
     };
     network.points[3] = Point { coordinates: place(3), sd: [0.002, f64::INFINITY, 0.003] };

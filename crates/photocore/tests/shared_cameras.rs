@@ -16,6 +16,8 @@ use photocore::network::{
 };
 use photocore::{Stopped, Threads};
 
+use crate::scatter;
+
 const FREE: f64 = f64::INFINITY;
 const PHOTOS: usize = 14;
 const POINTS: usize = 40;
@@ -23,11 +25,6 @@ const IMAGE_SD: f64 = 0.5;
 const TIGHT: Method = Method::Damped(Stop::Fraction(1e-9));
 /// Two cameras of several photos, one of a single photo, a fixed one, one with only a principal distance, and a backward one.
 const CAMERA_OF: [usize; PHOTOS] = [0, 1, 0, 1, 0, 1, 0, 2, 3, 4, 4, 5, 5, 5];
-
-/// Returns a reproducible number between -1 and 1 for each index.
-fn noise(index: usize) -> f64 {
-    ((index as f64 * 12.9898).sin() * 43758.5453).fract()
-}
 
 /// c, xp, yp, K1, K2, K3, P1, P2, b1, b2 and the balancing radius.
 const BROWN: [f64; 11] = [-1000.0, 3.0, -5.0, -5e-8, 2e-13, 0.0, 1e-6, -2e-6, 3e-4, -2e-4, 300.0];
@@ -106,12 +103,12 @@ fn image(pose: &[C], camera: &[C], point: &[C]) -> [C; 2] {
 
 fn pose(photo: usize) -> [f64; 6] {
     let around = -2.5 + 5.0 * photo as f64 / PHOTOS as f64;
-    let [a, b] = [0, 1].map(|k| 0.2 * noise(photo + 50 * k));
-    [a, -around, b, 0.3 * noise(photo + 100), 0.3 * noise(photo + 150), -10.0 + noise(photo + 200)]
+    let [a, b] = [0, 1].map(|k| 0.2 * scatter(photo + 50 * k));
+    [a, -around, b, 0.3 * scatter(photo + 100), 0.3 * scatter(photo + 150), -10.0 + scatter(photo + 200)]
 }
 
 fn place(point: usize) -> [f64; 3] {
-    std::array::from_fn(|k| 2.0 * noise(3 * point + k + 400))
+    std::array::from_fn(|k| 2.0 * scatter(3 * point + k + 400))
 }
 
 fn complex(values: &[f64]) -> Vec<C> {
@@ -127,17 +124,17 @@ fn network() -> Network {
             let parameters: Vec<f64> = cameras[CAMERA_OF[photo]].camera.parameters();
             let exact = exact(&complex(&pose(photo)), &complex(&parameters), &complex(&place(point)));
             let n = 2 * images.len();
-            let xy = [0, 1].map(|k| exact[k] + IMAGE_SD * noise(n + k + 7000));
+            let xy = [0, 1].map(|k| exact[k] + IMAGE_SD * scatter(n + k + 7000));
             images.push(Image { photo, point, xy, sd: [IMAGE_SD; 2] });
         }
     }
     let photo = |photo: usize| {
-        let pose = std::array::from_fn(|k| pose(photo)[k] + 0.01 * noise(6 * photo + k + 900));
+        let pose = std::array::from_fn(|k| pose(photo)[k] + 0.01 * scatter(6 * photo + k + 900));
         Photo { pose, observed: pose, sd: [FREE; 6], camera: CAMERA_OF[photo] }
     };
     let point = |point: usize| {
         let sd = if point < 6 { 0.002 } else { FREE };
-        Point { coordinates: place(point).map(|value| value + 0.001 * noise(point + 1300)), sd: [sd; 3] }
+        Point { coordinates: place(point).map(|value| value + 0.001 * scatter(point + 1300)), sd: [sd; 3] }
     };
     let length = |points: [usize; 2]| {
         let [p, q] = points.map(place);

@@ -12,6 +12,8 @@ use photocore::adjustment::{
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
 
+use crate::scatter;
+
 /// Points in the plane; distances between retained and local points are observations, distances between retained points are constraints.
 struct Trilateration {
     layout: Layout,
@@ -77,16 +79,11 @@ impl Model for Trilateration {
 
 const SD: f64 = 0.01;
 
-/// Returns a reproducible number between -1 and 1 for each index.
-fn noise(index: usize) -> f64 {
-    ((index as f64 * 12.9898).sin() * 43758.5453).fract()
-}
-
 /// Returns a grid of 4 x 3 retained points and 8 local ones, each local one observed from four retained points.
 fn network(held: Vec<usize>) -> Problem<Trilateration> {
     let retained: Vec<[f64; 2]> = (0..12).map(|k| [100.0 * (k % 4) as f64, 120.0 * (k / 4) as f64]).collect();
     let local: Vec<[f64; 2]> =
-        (0..8).map(|k| [40.0 + 33.0 * k as f64, 60.0 + 70.0 * noise(k).abs()]).collect();
+        (0..8).map(|k| [40.0 + 33.0 * k as f64, 60.0 + 70.0 * scatter(k).abs()]).collect();
     let (mut ptr, mut seen) = (vec![0], Vec::new());
     for k in 0..8 {
         seen.extend([k, k + 1, k + 3, k + 4].map(|station| station as u32 % 12));
@@ -101,8 +98,8 @@ fn network(held: Vec<usize>) -> Problem<Trilateration> {
     let of_groups = (0..seen.len()).map(|g| distance(g / 4 * 2, 16 + 2 * seen[g] as usize));
     let of_ties = pairs.iter().map(|pair| distance(16 + 2 * pair[0] as usize, 16 + 2 * pair[1] as usize));
     let lengths: Vec<f64> =
-        of_groups.chain(of_ties).enumerate().map(|(i, length)| length + SD * noise(100 + i)).collect();
-    let initial: Vec<f64> = truth.iter().enumerate().map(|(i, x)| x + 0.5 * noise(500 + i)).collect();
+        of_groups.chain(of_ties).enumerate().map(|(i, length)| length + SD * scatter(100 + i)).collect();
+    let initial: Vec<f64> = truth.iter().enumerate().map(|(i, x)| x + 0.5 * scatter(500 + i)).collect();
     let unknowns = layout.unknowns();
     Problem {
         observation_sd: vec![SD; lengths.len()],
@@ -119,13 +116,7 @@ fn threads() -> Threads {
 }
 
 fn options() -> Options {
-    Options {
-        method: Method::TrustRegion(Stop::Decrease(1e-14)),
-        max_iterations: 100,
-        covariance: true,
-        loss: None,
-        threads: 0,
-    }
+    Options { method: Method::TrustRegion(Stop::Decrease(1e-14)), ..Options::default() }
 }
 
 fn go<T>(_: T) -> ControlFlow<()> {
