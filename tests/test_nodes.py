@@ -435,7 +435,7 @@ def test_sums_are_those_of_the_whole_block(small):
 def test_what_a_node_takes_is_told_before(small):
     _, pieces = small
     for own in pieces:
-        told, outer = own.node.prediction, len(own.node.outer)
+        told, outer = own.node.prediction(1), len(own.node.outer)
         assert told["outer"] == outer
         assert told["points"] + told["interior"] + told["outer"] == own.node.size
         assert told["images"] == len(own.images)

@@ -1043,9 +1043,8 @@ class Node:
     def ends_slowly(self) -> bool:
         """Whether photos share free or weighted cameras, so that a final chord helps (docs/adjustment.md)."""
 
-    @property
-    def prediction(self) -> dict[str, float]:
-        """Predicted work and memory, from the sparsity pattern.
+    def prediction(self, threads: int) -> dict[str, float]:
+        """Return the predicted work and memory with a number of threads, from the sparsity pattern.
 
         `points`, `interior`, `outer`: unknowns of points, of own blocks, of outer blocks (S). `images`,
         `observations`: image points, all equations. `reduction`, `factor`, `inverse`: multiply-adds of one

@@ -126,8 +126,11 @@ class ToyNode:
         rows = 2 * len(self.images)
         self.counts = rows, 2 * len(self.weighted), len(self.local) - len(self.outer)
         n, s = len(self.local), len(self.outer)
-        self.prediction = {"memory_bytes": 24.0 * n * n, "factor_bytes": 8.0 * n * n, "node_bytes": 8.0 * n}
-        self.prediction["contribution_bytes"] = 8.0 * (s * (s + 1) / 2 + 2 * s)
+        self._bytes = {"memory_bytes": 24.0 * n * n, "factor_bytes": 8.0 * n * n, "node_bytes": 8.0 * n}
+        self._bytes["contribution_bytes"] = 8.0 * (s * (s + 1) / 2 + 2 * s)
+
+    def prediction(self, threads):
+        return self._bytes
 
     def _rows(self, block):
         return [self.toy.c] if block == self.toy.stations else [2 * block, 2 * block + 1]

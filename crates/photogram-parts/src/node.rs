@@ -74,7 +74,7 @@ impl Node {
         let none = network.left_out(vec![false; network.photos.len()], None)?;
         let selected = threads.install(|| network.select(&none, surroundings));
         let assembled = threads.install(|| network.assemble(options, selected, None))?;
-        assembled.check_memory(options)?;
+        assembled.check_memory(options, threads)?;
         let layout = assembled.problem().layout();
         let outer = layout.unknowns_of(layout.outer()).collect();
         let below =
@@ -124,8 +124,8 @@ impl Node {
 
     /// Returns the predicted cost by name, computed from the sparsity pattern: numbers of parameters, images and equations, multiply-adds
     /// of each phase, and bytes. `factor_bytes` are those of a formed node in addition to `node_bytes`; `memory_bytes` is the peak of
-    /// forming, inverting or writing, including the input and the node.
-    pub fn prediction(&self) -> [(&'static str, f64); 14] {
+    /// forming, inverting or writing with a number of threads, including the input and the node.
+    pub fn prediction(&self, threads: usize) -> [(&'static str, f64); 14] {
         let system = &self.problem().system;
         let (layout, symbolic) = (system.layout(), system.symbolic());
         let outer = symbolic.outer_unknowns();
@@ -146,7 +146,7 @@ impl Node {
             ("factor_bytes", bytes(system.numbers_in_factor() - outer * outer + 3 * self.size())),
             (
                 "memory_bytes",
-                node + count(system.memory_of_part()) + bytes(handed + FOUND * layout.equations()),
+                node + count(system.memory_of_part(threads)) + bytes(handed + FOUND * layout.equations()),
             ),
             ("contribution_bytes", bytes(packed(outer) + 2 * outer)),
             ("cofactor_bytes", bytes(packed(outer))),

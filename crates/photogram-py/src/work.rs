@@ -46,6 +46,17 @@ impl Workers {
     pub fn reading(rows: usize) -> Self {
         Self { multiply: false, ..Self::of(0, rows) }
     }
+
+    /// Number of threads, limited per processor.
+    pub fn count(&self) -> usize {
+        static PROCESSORS: OnceLock<usize> = OnceLock::new();
+        let processors = *PROCESSORS.get_or_init(|| thread::available_parallelism().map_or(1, usize::from));
+        match self.threads {
+            None => 1,
+            Some(0) => processors,
+            Some(threads) => threads.min(THREADS_EACH * processors),
+        }
+    }
 }
 
 /// Runs work without the GIL. This thread checks signals and calls `progress` at intervals.
@@ -99,28 +110,21 @@ fn supervise(
         }
     };
     // A thread remains in its pool for the life of the process: only the main thread becomes a pool. Other threads are temporary.
-    let threads = match workers.threads {
-        None if !is_main_thread(py)? => Some(1),
-        asked => asked,
-    };
-    let done = match threads {
-        None => {
-            let pool = pool_of_main_thread()?;
-            py.detach(|| (!workers.multiply || memory::take_buffers()).then(|| work(pool, &mut watch)))
-        }
-        Some(threads) => {
-            let (pool, handles) = start(threads)?;
-            py.detach(|| {
-                let room = !workers.multiply
-                    || pool.broadcast(|_| memory::take_buffers()).into_iter().all(|has| has);
-                let pool = Threads::from(pool);
-                let done = room.then(|| work(&pool, &mut watch));
-                drop(pool);
-                // Threads retain their buffers until they end, and later threads may need the memory. A panic has reached the caller.
-                handles.into_iter().for_each(|thread| drop(thread.join()));
-                done
-            })
-        }
+    let done = if workers.threads.is_none() && is_main_thread(py)? {
+        let pool = pool_of_main_thread()?;
+        py.detach(|| (!workers.multiply || memory::take_buffers()).then(|| work(pool, &mut watch)))
+    } else {
+        let (pool, handles) = start(workers.count())?;
+        py.detach(|| {
+            let room =
+                !workers.multiply || pool.broadcast(|_| memory::take_buffers()).into_iter().all(|has| has);
+            let pool = Threads::from(pool);
+            let done = room.then(|| work(&pool, &mut watch));
+            drop(pool);
+            // Threads retain their buffers until they end, and later threads may need the memory. A panic has reached the caller.
+            handles.into_iter().for_each(|thread| drop(thread.join()));
+            done
+        })
     };
     let succeeded = done.ok_or_else(memory::no_buffers)?;
     match raised {
@@ -153,11 +157,8 @@ fn pool_of_main_thread() -> PyResult<&'static Threads> {
     Ok(pool)
 }
 
-/// Starts `threads` new threads (0: one per processor), limited per processor. Returns the pool and its join handles.
-fn start(threads: usize) -> PyResult<(ThreadPool, Vec<JoinHandle<()>>)> {
-    static PROCESSORS: OnceLock<usize> = OnceLock::new();
-    let processors = *PROCESSORS.get_or_init(|| thread::available_parallelism().map_or(1, usize::from));
-    let count = if threads == 0 { processors } else { threads.min(THREADS_EACH * processors) };
+/// Starts `count` new threads. Returns the pool and its join handles.
+fn start(count: usize) -> PyResult<(ThreadPool, Vec<JoinHandle<()>>)> {
     let mut handles = vec![];
     let spawn = |own: ThreadBuilder| {
         handles.push(thread::Builder::new().spawn(|| own.run())?);

@@ -201,7 +201,7 @@ class PartsPlan(Documented):
 
 def measured_rates(part: _photocore.Node) -> Rates:
     """Measure the speed of this process by forming and inverting one part."""
-    prediction = part.prediction
+    prediction = part.prediction(0)
     size = len(part.outer)
     start = time.perf_counter()
     formed = part.form(part.initial, [], damping=0.0, curved=False, threads=0)

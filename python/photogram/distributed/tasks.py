@@ -336,13 +336,13 @@ def predicted(job: Job, number: int) -> dict[str, float]:
 def _prediction(job: Job, node: Node) -> dict[str, float]:
     """Return the predicted work and memory of a node, with columns of a datum."""
     if not job.columns:
-        return dict(node.prediction)
+        return dict(node.prediction(job.threads))
     size = len(node.initial)
     kept, sent = 8.0 * size * (job.columns + LANES), 8.0 * job.columns * len(node.outer)
     # B, T, W and copies of them in the order of the core.
     more = {"factor_bytes": kept, "memory_bytes": kept + 6.0 * 8.0 * job.columns * size}
     more |= {"contribution_bytes": sent, "cofactor_bytes": sent}
-    return {name: value + more.get(name, 0.0) for name, value in node.prediction.items()}
+    return {name: value + more.get(name, 0.0) for name, value in node.prediction(job.threads).items()}
 
 
 def _plain(values: Floats) -> Floats:
@@ -369,7 +369,7 @@ def _node(job: Job, number: int) -> Node:
         # Release the memory of the tables.
         give_back()
         shelf.make_room(0.0, job.memory, (job.folder, number))
-        shelf.put(key, found, found.prediction["node_bytes"])
+        shelf.put(key, found, found.prediction(job.threads)["node_bytes"])
     return found
 
 

@@ -158,7 +158,7 @@ impl<'a> NetworkAdjustment<'a> {
             None => {}
         }
         let by_groups = self.datum.is_none() && plain && !matches!(own.method, Method::Full(_));
-        let joint = joint.filter(|_| by_groups && assembled.may_keep(&self.options)).map(|points| {
+        let joint = joint.filter(|_| by_groups && assembled.may_keep(&self.options, threads)).map(|points| {
             let unknowns = |&(_, place): &(usize, usize)| problem.model.of_point(place);
             points.iter().flat_map(unknowns).collect::<Vec<usize>>()
         });

@@ -86,8 +86,8 @@ impl Assembled {
     }
 
     /// Returns an error if the problem needs more memory than the options allow.
-    pub fn check_memory(&self, options: &Options) -> Result<(), NetworkError> {
-        let needed = options.reserved + self.problem.system.memory();
+    pub fn check_memory(&self, options: &Options, threads: &Threads) -> Result<(), NetworkError> {
+        let needed = options.reserved + self.problem.system.memory(threads.count());
         match options.memory {
             Some(available) if needed > available => Err(NetworkError::Memory { needed, available }),
             _ => Ok(()),
@@ -95,9 +95,9 @@ impl Assembled {
     }
 
     /// Returns true if the memory also suffices for group tests.
-    pub fn may_keep(&self, options: &Options) -> bool {
+    pub fn may_keep(&self, options: &Options, threads: &Threads) -> bool {
         let system = &self.problem.system;
-        let needed = options.reserved + system.memory() + system.memory_of_groups();
+        let needed = options.reserved + system.memory(threads.count()) + system.memory_of_groups();
         options.memory.is_none_or(|available| needed <= available)
     }
 
@@ -155,7 +155,7 @@ impl Network {
             return Err(NetworkError::Empty);
         }
         let assembled = threads.install(|| self.assemble(options, selected, reached))?;
-        assembled.check_memory(options)?;
+        assembled.check_memory(options, threads)?;
         Ok(assembled)
     }
 

@@ -144,12 +144,13 @@ impl Formation<'_> {
     /// Forms and factors; the pivots `given_up`, in elimination order, are always regarded as lost. None if memory is insufficient.
     fn factor(&self, given_up: &[usize]) -> Option<Factor> {
         let symbolic = &self.system.symbolic;
-        let values = self.control.allocated(self.system.workspace.zeros(symbolic.values()))?;
+        let values = self.control.allocated(self.system.workspace.panels(symbolic.values()))?;
         let mut panels = Panels { symbolic: Arc::clone(symbolic), values };
         let updates = Handover::new(symbolic.supernode_count());
         let visited = Handover::new(symbolic.supernode_count());
         let divided = panels.divide();
         let cached = self.room();
+        self.system.start();
         self.system.tree.upward(&|index| {
             if !self.control.stopped()
                 && let Some(found) =
@@ -233,6 +234,8 @@ impl Formation<'_> {
         if s.parent.is_some() {
             let (right, diagonal) = (right.split_off(width), diagonal.split_off(width));
             updates.put(index, Update { matrix: update, right, diagonal });
+        } else {
+            self.system.workspace.put_back(update);
         }
         Some(Visited {
             sums,
@@ -377,7 +380,7 @@ impl Factor {
 
     /// Returns its memory to the workspace of the system for reuse.
     pub fn recycle(self, system: &System) {
-        system.workspace.put_back(self.panels.values);
+        system.workspace.put_back_panels(self.panels.values);
         system.workspace.put_back_eliminated(self.eliminated);
     }
 

@@ -101,6 +101,7 @@ impl Walk<'_> {
         let above = Handover::new(count);
         let at_node = Handover::new(count);
         let divided = panels.divide();
+        self.system.start();
         self.system.tree.downward(&|index| {
             if !self.control.stopped()
                 && let Some(found) = self.visit(index, &mut lock(&divided[index]), &above)

@@ -1,9 +1,8 @@
 //! Memory requirements of an adjustment.
 
-use std::collections::HashMap;
-
+use super::symbolic::Supernode;
 use super::system::{System, vectors};
-use super::workspace::Workspace;
+use super::workspace::capacity;
 
 /// Size of a number in bytes.
 const BYTES: usize = size_of::<f64>();
@@ -13,23 +12,15 @@ const BASE: usize = 8 << 20;
 const COPIED: usize = 128 << 20;
 
 impl System {
-    /// Estimates the maximum size of all phases in bytes, including the problem and its results: the factor, simultaneous fronts and
-    /// vectors.
-    pub fn memory(&self) -> usize {
-        let mut buffers = Buffers::of(&self.workspace);
-        self.walk_up(&mut buffers);
-        self.walk_down(&mut buffers);
-        let of_fronts = self.workspace.capacity(self.symbolic.values()) + buffers.most;
-        BASE + BYTES * (of_fronts + vectors(&self.layout))
+    /// Estimates the maximum size of all phases with a number of threads in bytes, including the problem and its results: the factor,
+    /// simultaneous fronts and vectors.
+    pub fn memory(&self, threads: usize) -> usize {
+        self.memory_of_part(threads) + BYTES * vectors(&self.layout)
     }
 
-    /// Estimates the size for a partial system, which is released after its formation.
-    pub fn memory_of_part(&self) -> usize {
-        let mut walks = [Buffers::of(&self.workspace), Buffers::of(&self.workspace)];
-        self.walk_up(&mut walks[0]);
-        self.walk_down(&mut walks[1]);
-        let most = walks[0].most.max(walks[1].most);
-        BASE + BYTES * (self.workspace.capacity(self.symbolic.values()) + most)
+    /// Estimates the maximum size without vectors: that of a partial system, which is released after its formation.
+    pub fn memory_of_part(&self, threads: usize) -> usize {
+        BASE + BYTES * (self.symbolic.values() + self.fronts(threads))
     }
 
     /// Extra bytes for group tests and hypotheses: the leverage matrices of groups, their computation, and a copy of the factor.
@@ -53,70 +44,188 @@ impl System {
         self.workspace.clear();
     }
 
-    /// Simulates the front buffers of the factorisation.
-    fn walk_up(&self, buffers: &mut Buffers<'_>) {
-        let supernodes = self.symbolic.supernodes();
-        for s in supernodes {
-            buffers.take(s.below().pow(2));
-            s.children.iter().for_each(|&child| buffers.put_back(supernodes[child].below().pow(2)));
-        }
-        for root in supernodes.iter().filter(|s| s.parent.is_none()) {
-            buffers.put_back(root.below().pow(2));
-        }
+    /// Starts a traversal of the elimination tree by the current threads.
+    pub(super) fn start(&self) {
+        self.workspace.start(self.fronts(rayon::current_num_threads()));
     }
 
-    /// Simulates the front buffers of the inversion.
-    fn walk_down(&self, buffers: &mut Buffers<'_>) {
-        let supernodes = self.symbolic.supernodes();
-        for (index, s) in supernodes.iter().enumerate().rev() {
-            buffers.take(s.height().pow(2));
-            // A front is released by its last child, the first in the order.
-            let parent = s.parent.map(|parent| &supernodes[parent]);
-            if let Some(parent) = parent.filter(|parent| parent.children.first() == Some(&index)) {
-                buffers.put_back(parent.height().pow(2));
-            }
+    /// Returns the maximum number of elements in the fronts of a factorisation or an inversion.
+    fn fronts(&self, threads: usize) -> usize {
+        let square = |order: usize| capacity(order.pow(2));
+        let (mut updates, mut fronts) = (vec![], vec![]);
+        for s in self.symbolic.supernodes() {
+            updates.push(square(s.below()));
+            fronts.push(square(s.height()));
+        }
+        let upward = |index: usize, s: &Supernode, alone: bool| {
+            let all: usize = s.children.iter().map(|&child| updates[child]).sum();
+            let mut before = 0;
+            let waiting = s.children.iter().map(|&child| {
+                before += updates[child];
+                if alone { before - updates[child] } else { all - updates[child] }
+            });
+            let waiting = waiting.collect();
+            (updates[index] + all, waiting)
+        };
+        let downward = |index: usize, s: &Supernode, alone: bool| {
             // The inverse over the outer unknowns is given, not computed.
-            if self.symbolic.open() != Some(index) {
-                let products = [s.below() * s.width, s.width.pow(2)];
-                products.iter().for_each(|&length| buffers.take(length));
-                products.iter().for_each(|&length| buffers.put_back(length));
+            let is_open = self.symbolic.open() == Some(index);
+            let products = if is_open { 0 } else { capacity(s.below() * s.width) + square(s.width) };
+            let of_child = s.children.iter().map(|&child| fronts[child]).max().unwrap_or(0);
+            // The last child takes over the front.
+            let last = |k: usize| if alone { k == 0 } else { s.children.len() == 1 };
+            let waiting = |k: usize| if last(k) { 0 } else { fronts[index] };
+            (fronts[index] + products.max(of_child), (0..s.children.len()).map(waiting).collect())
+        };
+        let upward = self.most(threads, &|child| updates[child], &upward);
+        upward.max(self.most(threads, &|_| 0, &downward))
+    }
+
+    /// Returns the maximum size of all fronts in progress and of those that wait for others.
+    ///
+    /// The threads walk depth-first, so that fronts wait only on the ways from the roots to the fronts in progress. The union of these ways
+    /// consists of one chain per thread that branches off a longer one. The largest of all chains are an upper bound. It is exact for one
+    /// thread, since the order of its visits is known.
+    ///
+    /// * `kept`: size that waits after the visits of a subtree;
+    /// * `sizes`: size of a front in progress, and size that waits in it during the visit of each child, for one or several threads.
+    fn most(
+        &self,
+        threads: usize,
+        kept: &dyn Fn(usize) -> usize,
+        sizes: &dyn Fn(usize, &Supernode, bool) -> (usize, Vec<usize>),
+    ) -> usize {
+        let (mut most, mut chains) = (Vec::<usize>::new(), vec![]);
+        for (index, s) in self.symbolic.supernodes().iter().enumerate() {
+            let alone = threads == 1 || !self.tree.is_above(index);
+            let (own, waiting) = sizes(index, s, alone);
+            let with_child = |(waiting, &child): (usize, &usize)| waiting + most[child];
+            let of_children = waiting.into_iter().zip(&s.children).map(with_child).max();
+            if !alone {
+                let mut added: Vec<usize> =
+                    s.children.iter().map(|&child| most[child] - kept(child)).collect();
+                added.sort_unstable();
+                added.pop();
+                chains.extend(added);
             }
-            if s.children.is_empty() {
-                buffers.put_back(s.height().pow(2));
-            }
+            most.push(own.max(of_children.unwrap_or(0)));
+            chains.extend(s.parent.is_none().then_some(most[index]));
         }
+        chains.sort_unstable();
+        chains.iter().rev().take(threads).sum()
     }
 }
 
-/// Simulated buffers of a workspace, by capacity.
-struct Buffers<'a> {
-    workspace: &'a Workspace,
-    spare: HashMap<usize, usize>,
-    /// Current and maximum number of elements in all buffers.
-    made: usize,
-    most: usize,
-}
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used)]
 
-impl<'a> Buffers<'a> {
-    fn of(workspace: &'a Workspace) -> Self {
-        Self { workspace, spare: HashMap::new(), made: 0, most: 0 }
-    }
+    use std::ops::ControlFlow;
 
-    fn take(&mut self, length: usize) {
-        let capacity = self.workspace.capacity(length);
-        match self.spare.get_mut(&capacity).filter(|spare| **spare > 0) {
-            Some(spare) => *spare -= 1,
-            None => self.made += capacity,
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::Threads;
+    use crate::normals::{
+        Equations, FactorOptions, GroupRows, InvertOptions, Layout, Ordering, Prior, SelectedInverse,
+    };
+
+    struct Irregular;
+
+    impl Equations for Irregular {
+        fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
+            let numbers = rows.local.iter_mut().chain(&mut *rows.retained).enumerate();
+            numbers.for_each(|(k, value)| *value = ((7 * local + 3 * group + k) as f64).sin());
+            rows.constant.fill(1.0);
         }
-        self.most = self.most.max(self.made);
     }
 
-    fn put_back(&mut self, length: usize) {
-        let capacity = self.workspace.capacity(length);
-        if self.workspace.gives_back(capacity) {
-            self.made -= capacity;
-        } else {
-            *self.spare.entry(capacity).or_default() += 1;
+    /// Returns a system whose local blocks have observations with some of `count` retained blocks.
+    fn system(count: usize, locals: &[Vec<usize>]) -> System {
+        let ends = locals.iter().scan(0, |end, blocks| {
+            *end += blocks.len();
+            Some(*end)
+        });
+        let starts = std::iter::once(0).chain(ends).collect();
+        let retained = locals.iter().flatten().map(|&block| block as u32).collect();
+        let layout = Layout::new(2, 1, &vec![6; count], starts, retained).unwrap();
+        System::new(layout, Ordering::Auto).unwrap()
+    }
+
+    /// Returns the predicted and the counted number of elements in fronts, and the selected inverse.
+    fn fronts(system: &System, threads: usize) -> (usize, usize, SelectedInverse) {
+        let threads = Threads::new(threads).unwrap();
+        let unknowns = system.layout.unknowns();
+        let prior = Prior { weight: vec![1.0; unknowns], right: vec![0.0; unknowns], between: vec![] };
+        let mut go_on = |_| ControlFlow::Continue(());
+        system.release();
+        let factor =
+            system.factor(&threads, &Irregular, &prior, &FactorOptions::UNCACHED, &mut go_on).unwrap();
+        let options = InvertOptions::default();
+        let inverse = system.invert(&threads, factor, &Irregular, &prior, &options, &mut go_on).unwrap();
+        (system.fronts(threads.count()), system.workspace.most(), inverse.selected)
+    }
+
+    /// Checks the prediction for several numbers of threads, and that they compute the same bits.
+    fn check(system: &System) {
+        let (predicted, counted, serial) = fronts(system, 1);
+        assert!(counted <= predicted && 2 * predicted <= 3 * counted, "{predicted}, counted {counted}");
+        for threads in [2, 3, 8] {
+            let (predicted, counted, inverse) = fronts(system, threads);
+            eprintln!("{threads} threads: {predicted}, counted {counted}");
+            assert!(counted <= predicted, "{threads} threads: {predicted}, counted {counted}");
+            let bits = |inverse: &SelectedInverse| {
+                let blocks = 0..system.symbolic.blocks();
+                blocks.flat_map(|block| inverse.block(block, block).unwrap()).map(f64::to_bits).collect()
+            };
+            let (one, several): (Vec<u64>, Vec<u64>) = (bits(&serial), bits(&inverse));
+            assert!(one == several, "{threads} threads");
+        }
+    }
+
+    /// Returns the grid cells with their corners.
+    fn grid(columns: usize, rows: usize) -> Vec<Vec<usize>> {
+        let corners = |cell: usize| {
+            let first = cell / (columns - 1) * columns + cell % (columns - 1);
+            vec![first, first + 1, first + columns, first + columns + 1]
+        };
+        (0..(columns - 1) * (rows - 1)).map(corners).collect()
+    }
+
+    #[test]
+    fn the_prediction_is_an_upper_bound_for_a_large_grid() {
+        check(&system(40 * 40, &grid(40, 40)));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+
+        #[test]
+        fn the_prediction_is_an_upper_bound_for_grids(columns in 2_usize..30, rows in 2_usize..30) {
+            check(&system(columns * rows, &grid(columns, rows)));
+        }
+
+        #[test]
+        fn the_prediction_is_an_upper_bound_for_chains(count in 4_usize..2000, length in 2_usize..4) {
+            let links: Vec<Vec<usize>> =
+                (0..count - length).map(|first| (first..first + length).collect()).collect();
+            check(&system(count, &links));
+        }
+
+        #[test]
+        fn the_prediction_is_an_upper_bound_for_blocks(
+            count in 10_usize..300,
+            far in prop::collection::vec((0_usize..1000, 1_usize..1000, 0_usize..20), 30..600),
+        ) {
+            let images = |&(first, further, near): &(usize, usize, usize)| {
+                let mut photos = vec![first % count, (first + near) % count];
+                photos.extend((further % 7 == 0).then_some(further % count));
+                photos.sort_unstable();
+                photos.dedup();
+                photos
+            };
+            let points: Vec<Vec<usize>> = far.iter().map(images).collect();
+            check(&system(count, &points));
         }
     }
 }

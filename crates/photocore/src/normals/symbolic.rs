@@ -15,7 +15,6 @@ const AS_GOOD: f64 = 1.05;
 ///
 /// The *position* of a block is its index in the elimination order. Blocks of nearly equal pattern form one supernode, whose columns form
 /// one dense panel. Outer blocks form the last supernode, which is *open*: its front is assembled but not factored.
-/// assembled and not factored.
 #[derive(Debug, Clone)]
 pub struct Symbolic {
     ordering: Ordering,

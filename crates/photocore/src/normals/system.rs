@@ -67,8 +67,6 @@ impl System {
         let tree = Tree::new(&symbolic, symbolic.supernodes().iter().enumerate().map(work).collect());
         let cached: Vec<usize> =
             (0..=symbolic.supernode_count()).map(|index| numbers_at(&incidence, &layout, index)).collect();
-        let is_part = symbolic.open().is_some() || !layout.contributions().is_empty();
-        let workspace = if is_part { Workspace::frugal() } else { Workspace::default() };
         let caches = cached.iter().sum::<usize>() <= made_of_results(&layout);
         let system = Self {
             layout,
@@ -77,7 +75,7 @@ impl System {
             ties,
             contributions,
             tree,
-            workspace,
+            workspace: Workspace::default(),
             caches,
             cached: if caches { cached } else { Vec::new() },
         };

@@ -1,10 +1,13 @@
 //! Parallel traversal of the elimination tree.
 
+use std::ops::Range;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering::AcqRel};
 
-use rayon::ScopeFifo;
+use rayon::Scope;
 
 use super::symbolic::Symbolic;
+use crate::parallel::lock;
 
 /// Elimination tree with two levels of tasks: subtrees for one thread each, and single supernodes above them. Supernodes in different
 /// branches are independent, so that the order of visits does not change results.
@@ -53,48 +56,87 @@ impl Tree {
     pub fn upward(&self, visit: &(dyn Fn(usize) + Sync)) {
         let waiting: Vec<AtomicUsize> =
             self.below.iter().map(|units| AtomicUsize::new(units.len())).collect();
-        let start = |unit: usize| {
-            (self.first[unit]..unit).for_each(visit);
-            let mut index = unit;
-            visit(index);
-            // The last finished child continues with the parent.
-            while let Some(parent) = self.parent[index] {
-                if waiting[parent].fetch_sub(1, AcqRel) > 1 {
-                    break;
-                }
-                visit(parent);
-                index = parent;
-            }
-        };
-        let start = &start;
-        let is_start = |&unit: &usize| !self.above[unit] || self.below[unit].is_empty();
-        rayon::scope_fifo(|scope| {
-            for unit in self.units().filter(is_start) {
-                scope.spawn_fifo(move |_| start(unit));
-            }
+        let starts = self.units().filter(|&unit| !self.above[unit] || self.below[unit].is_empty());
+        let mut ready: Vec<usize> = starts.collect();
+        ready.reverse();
+        walk(ready, &|unit| {
+            self.subtree(unit).for_each(visit);
+            // The last finished child makes the parent ready.
+            let parent = self.parent[unit].filter(|&parent| waiting[parent].fetch_sub(1, AcqRel) == 1);
+            parent.into_iter().collect()
         });
     }
 
     /// Visits every supernode before its descendants.
     pub fn downward(&self, visit: &(dyn Fn(usize) + Sync)) {
-        rayon::scope_fifo(|scope| self.roots.iter().for_each(|&root| self.descend(scope, root, visit)));
-    }
-
-    fn descend<'a>(&'a self, scope: &ScopeFifo<'a>, unit: usize, visit: &'a (dyn Fn(usize) + Sync)) {
-        scope.spawn_fifo(move |scope| {
-            let mut unit = unit;
-            while self.above[unit] {
-                visit(unit);
-                let Some((&next, others)) = self.below[unit].split_last() else { return };
-                others.iter().for_each(|&other| self.descend(scope, other, visit));
-                unit = next;
-            }
-            (self.first[unit]..=unit).rev().for_each(visit);
+        walk(self.roots.clone(), &|unit| {
+            self.subtree(unit).rev().for_each(visit);
+            self.below[unit].clone()
         });
     }
 
     fn units(&self) -> impl Iterator<Item = usize> {
         (0..self.parent.len())
             .filter(|&index| self.above[index] || self.parent[index].is_none_or(|parent| self.above[parent]))
+    }
+
+    /// Whether a supernode is above the undivided subtrees.
+    pub fn is_above(&self, supernode: usize) -> bool {
+        self.above[supernode]
+    }
+
+    /// Returns the supernodes of a unit, children before parents.
+    fn subtree(&self, unit: usize) -> Range<usize> {
+        if self.above[unit] { unit..unit + 1 } else { self.first[unit]..unit + 1 }
+    }
+}
+
+/// Visits units in the order of their readiness; a visit returns the units that it makes ready. There are as many walkers as threads, and
+/// each visits one unit at a time. This limits the units in progress, although a thread that waits inside a visit may begin another one.
+fn walk(ready: Vec<usize>, visit: &(dyn Fn(usize) -> Vec<usize> + Sync)) {
+    let idle: Vec<usize> = (0..rayon::current_num_threads()).collect();
+    let mut stacks = vec![Vec::new(); idle.len()];
+    stacks[0] = ready;
+    let walkers = Mutex::new(Walkers { stacks, idle });
+    rayon::scope(|scope| Walkers::go_on(&walkers, scope, visit));
+}
+
+/// Walkers through a tree. Each continues with the unit that became ready last in its own part of the tree, so that it walks depth-first:
+/// fronts wait only on the ways from the roots to the units in progress.
+struct Walkers {
+    /// Ready units of each walker, the next one last.
+    stacks: Vec<Vec<usize>>,
+    idle: Vec<usize>,
+}
+
+impl Walkers {
+    /// Starts the idle walkers for which a unit is ready.
+    fn go_on<'a>(
+        walkers: &'a Mutex<Self>,
+        scope: &Scope<'a>,
+        visit: &'a (dyn Fn(usize) -> Vec<usize> + Sync),
+    ) {
+        for (walker, unit) in lock(walkers).next() {
+            scope.spawn(move |scope| {
+                let ready = visit(unit);
+                let mut all = lock(walkers);
+                all.stacks[walker].extend(ready);
+                all.idle.push(walker);
+                drop(all);
+                Self::go_on(walkers, scope, visit);
+            });
+        }
+    }
+
+    /// Takes the next unit for each idle walker: its own, or one of another walker.
+    fn next(&mut self) -> Vec<(usize, usize)> {
+        let mut next = vec![];
+        while let Some(&walker) = self.idle.last() {
+            let own = self.stacks[walker].pop();
+            let Some(unit) = own.or_else(|| self.stacks.iter_mut().find_map(Vec::pop)) else { break };
+            self.idle.pop();
+            next.push((walker, unit));
+        }
+        next
     }
 }

@@ -1,6 +1,6 @@
 //! Reusable buffers, with errors for failed allocations.
 
-use std::collections::HashMap;
+use std::collections::BTreeMap;
 use std::sync::Mutex;
 
 use super::batch::Batch;
@@ -9,39 +9,62 @@ use crate::parallel::lock;
 /// Matrices V, v and L of every batch, one after the other, per supernode; last, local blocks without equations. Empty without a cache.
 pub(super) type Eliminated = Vec<Vec<f64>>;
 
-/// Spare buffers by capacity (see [`capacity`]). There are thousands of fronts, and allocating and releasing fresh pages for each would
-/// cost more than the arithmetic.
+/// Reusable buffers. There are thousands of fronts, and allocating and releasing fresh pages for each would cost more than the arithmetic.
 #[derive(Debug, Default)]
 pub(super) struct Workspace {
-    /// Whether very large buffers are allocated exactly and released after use.
-    frugal: bool,
-    spare: Mutex<HashMap<usize, Vec<Vec<f64>>>>,
+    fronts: Mutex<Buffers>,
+    panels: Mutex<Vec<f64>>,
     eliminated: Mutex<Eliminated>,
     /// Batch buffers, which differ little in size.
     batches: Mutex<Vec<Batch>>,
 }
 
-impl Workspace {
-    /// Creates the workspace of a partial system: its fronts are few, very large and of increasing size, so that they are not reusable.
-    pub fn frugal() -> Self {
-        Self { frugal: true, ..Self::default() }
-    }
+/// Buffers of fronts. Spare ones are released if all together would exceed the limit.
+#[derive(Debug, Default)]
+struct Buffers {
+    spare: BTreeMap<usize, Vec<Vec<f64>>>,
+    /// Number of elements in spare buffers, in buffers in use and in all at most.
+    unused: usize,
+    used: usize,
+    limit: usize,
+    #[cfg(test)]
+    most: usize,
+}
 
-    /// Returns the capacity of a buffer of `length` numbers: the next power of two, for large ones the next eighth of it.
-    pub fn capacity(&self, length: usize) -> usize {
-        let power = length.next_power_of_two();
-        if length < LARGE {
-            power
-        } else if self.gives_back(length) {
-            length
-        } else {
-            length.next_multiple_of(power / 8)
+impl Buffers {
+    /// Returns a spare buffer of a capacity, or makes room for a new one.
+    fn take(&mut self, capacity: usize) -> Option<Vec<f64>> {
+        let found = self.spare.get_mut(&capacity).and_then(Vec::pop);
+        if found.is_some() {
+            self.unused -= capacity;
         }
+        while self.unused > 0 && self.unused + self.used + capacity > self.limit {
+            let Some(mut largest) = self.spare.last_entry() else { break };
+            self.unused -= largest.get_mut().pop().map_or(0, |buffer| buffer.capacity());
+            if largest.get().is_empty() {
+                largest.remove();
+            }
+        }
+        self.used += capacity;
+        #[cfg(test)]
+        {
+            self.most = self.most.max(self.used + self.unused);
+        }
+        found
     }
+}
 
-    /// Whether a buffer of this capacity is released after use.
-    pub fn gives_back(&self, capacity: usize) -> bool {
-        self.frugal && capacity >= HUGE
+/// Returns the capacity of a buffer of `length` numbers: the next power of two, for large ones the next eighth of it.
+pub(super) fn capacity(length: usize) -> usize {
+    let power = length.next_power_of_two();
+    if length < LARGE { power } else { length.next_multiple_of(power / 8) }
+}
+
+impl Workspace {
+    /// Starts a traversal whose fronts have at most `limit` elements at the same time.
+    pub fn start(&self, limit: usize) {
+        let mut fronts = lock(&self.fronts);
+        (fronts.used, fronts.limit) = (0, limit);
     }
 
     /// Returns a zeroed buffer. `Err`: size of the failed allocation in bytes.
@@ -68,14 +91,32 @@ impl Workspace {
 
     /// Stores a buffer for reuse.
     pub fn put_back(&self, buffer: Vec<f64>) {
-        if buffer.capacity() > 0 && !self.gives_back(buffer.capacity()) {
-            lock(&self.spare).entry(buffer.capacity()).or_default().push(buffer);
+        let (capacity, mut fronts) = (buffer.capacity(), lock(&self.fronts));
+        fronts.used = fronts.used.saturating_sub(capacity);
+        fronts.unused += capacity;
+        fronts.spare.entry(capacity).or_default().push(buffer);
+    }
+
+    /// Returns zeroed values of all panels. `Err`: size of the failed allocation in bytes.
+    pub fn panels(&self, length: usize) -> Result<Vec<f64>, usize> {
+        let mut values = std::mem::take(&mut *lock(&self.panels));
+        if values.capacity() < length {
+            values = reserved(length)?;
         }
+        values.clear();
+        values.resize(length, 0.0);
+        Ok(values)
+    }
+
+    /// Stores the values of all panels for reuse.
+    pub fn put_back_panels(&self, values: Vec<f64>) {
+        *lock(&self.panels) = values;
     }
 
     /// Releases all spare buffers.
     pub fn clear(&self) {
-        lock(&self.spare).clear();
+        *lock(&self.fronts) = Buffers::default();
+        *lock(&self.panels) = Vec::new();
         drop(self.take_eliminated());
         lock(&self.batches).clear();
     }
@@ -100,18 +141,21 @@ impl Workspace {
         *lock(&self.eliminated) = room;
     }
 
+    /// Maximum number of elements in all buffers of fronts since the last release.
+    #[cfg(test)]
+    pub fn most(&self) -> usize {
+        lock(&self.fronts).most
+    }
+
     fn take(&self, length: usize) -> Result<Vec<f64>, usize> {
-        let capacity = self.capacity(length);
-        let found = lock(&self.spare).get_mut(&capacity).and_then(Vec::pop);
+        let capacity = capacity(length);
+        let found = lock(&self.fronts).take(capacity);
         found.map_or_else(|| reserved(capacity), Ok)
     }
 }
 
 /// Minimum number of elements for capacities that are not powers of two.
 const LARGE: usize = 1 << 20;
-
-/// Minimum number of elements of a very large buffer: 64 MiB, which an allocator maps separately.
-const HUGE: usize = 1 << 23;
 
 /// Returns an empty vector with a reserved capacity. `Err`: size of the failed allocation in bytes.
 pub(super) fn reserved(capacity: usize) -> Result<Vec<f64>, usize> {

@@ -11,7 +11,7 @@ use photocore::normals::Contribution;
 use photogram_parts::{DatumOfPart, FormedNode as Formed, Node as Core};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::types::{IntoPyDict, PyDict};
 
 use super::covariances::refused;
 use super::solution::BlockSolution;
@@ -112,11 +112,8 @@ impl Node {
         PyArray1::from_slice(py, self.node.initial())
     }
 
-    #[getter]
-    fn prediction<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let dict = PyDict::new(py);
-        self.node.prediction().into_iter().try_for_each(|(name, value)| dict.set_item(name, value))?;
-        Ok(dict)
+    fn prediction<'py>(&self, py: Python<'py>, threads: usize) -> PyResult<Bound<'py, PyDict>> {
+        self.node.prediction(self.workers(threads).count()).into_py_dict(py)
     }
 
     fn advance<'py>(&self, py: Python<'py>, state: Array<'py>, step: Array<'py>) -> PyResult<Vector<'py>> {
