@@ -99,7 +99,6 @@ def test_groups_of_the_golden_block():
     number = {str(suspects.name(group)): group for group in range(len(suspects))}
     blocks = np.concatenate([[0], np.cumsum(np.diff(suspects.row_starts) ** 2)])
     effects = trial.core.effects(list(range(len(suspects))))
-    moved = trial.core.most_moved(list(range(len(suspects))))
     noncentrality = lambda0()
     for own in data["adjustment"]["observations"]:
         group, expected = number[called(own["observation"])], own["group"]
@@ -117,11 +116,7 @@ def test_groups_of_the_golden_block():
             if r_row < 0.01:
                 continue
             size = np.sqrt(noncentrality / r_row)
-            assert size * effects[row, :3] == pytest.approx(effect["own_point"], rel=1e-5, abs=1e-7)
-            if "own_photo" in effect:
-                assert size * effects[row, 3:] == pytest.approx(effect["own_photo"], rel=1e-5, abs=1e-7)
-            assert size * moved[row][4] == pytest.approx(effect["largest_in_sd"], rel=1e-5)
-            assert abs(size * moved[row][3]) == pytest.approx(abs(effect["effect"]), rel=1e-5)
+            assert size * effects[row] == pytest.approx(effect["own_point"], rel=1e-5, abs=1e-7)
 
 
 def lambda0_of(dimension):
@@ -364,15 +359,20 @@ def test_reliability():
     assert np.isinf(two[0].factor)
     partners = found.partners(number["image of point 021 on photo S2P1"])
     assert partners[0].second == "image of point 021 on photo S2P2"
-    *_, in_sd = zip(*found.trial.core.most_moved(list(range(len(found.suspects)))), strict=True)
-    effects = (np.array(in_sd) * found.detectable / found.sd)[found.redundancy > 0.01]
-    largest = max(
-        effect["largest_in_sd"]
-        for own in data["adjustment"]["observations"]
-        for r, effect in zip(own["redundancy"], own["effect_of_mdb"], strict=True)
-        if r > 0.01
-    )
-    assert effects.max() == pytest.approx(largest, rel=1e-4)
+    on_photos = np.array([found.influence(("photo", photo))[1] for photo in block.photo_ids])
+    on_points = np.array([found.influence(("point", point))[1] for point in block.point_ids])
+    cofactors = (result.photo_cofactors, result.point_cofactors)
+    sd = [np.sqrt(np.diagonal(own, axis1=1, axis2=2))[..., np.newaxis] for own in cofactors]
+    in_sd = [np.abs(own / sd).max(axis=(0, 1)) for own, sd in zip((on_photos, on_points), sd, strict=True)]
+    for own in data["adjustment"]["observations"]:
+        rows = suspects.rows(number[called(own["observation"])])
+        for row, r, effect in zip(rows, own["redundancy"], own["effect_of_mdb"], strict=True):
+            if r < 0.01:
+                continue
+            assert max(on[row] for on in in_sd) == pytest.approx(effect["largest_in_sd"], rel=1e-5)
+            if "own_photo" in effect:
+                photo = block.photo_ids.index(own["observation"][1])
+                assert on_photos[photo, :, row] == pytest.approx(effect["own_photo"], rel=1e-5, abs=1e-7)
     assert "image" in found.table()["kind"].tolist()
     assert len(found.table()) == len(found.redundancy)
 

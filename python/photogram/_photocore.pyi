@@ -1465,25 +1465,15 @@ class NetworkTrial:
         """
 
     def effects(self, suspects: list[int]) -> _Floats:
-        """Return the effects of an error of one standard deviation in each row of some groups.
+        """Return the effects of an error of one standard deviation in each row of some groups on its point.
 
         Returns
         -------
-        (., 9): the three coordinates of the point of the row, the six numbers of its photo; NaN if it has
-        neither.
+        (., 3): changes of the coordinates; NaN without a point.
         """
 
     def responses(self, suspects: list[int]) -> _Floats:
         """Return the columns of R of the rows of some groups: (., M)."""
-
-    def most_moved(self, suspects: list[int]) -> list[tuple[str, int, int, float, float]]:
-        """Return, for each row of some groups, the unknown with the largest effect of an error.
-
-        Returns
-        -------
-        Type (`photo`, `camera`, `unknown`, `point`), index and component of the unknown; its change by an
-        error of one standard deviation, in its unit and in its standard deviations (a-priori unit weight).
-        """
 
     def inseparable(self, points: list[int], limit: float) -> tuple[_Indices, _Indices, _Floats]:
         """Return both groups of pairs on one point with correlated tests, and the correlation > `limit`."""

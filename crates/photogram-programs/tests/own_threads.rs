@@ -86,7 +86,6 @@ fn adjust_block(network: &Network, threads: &Threads) {
     trial.tests(true, threads).unwrap();
     trial.effects(&[0, 5], threads).unwrap();
     trial.responses(&[0, 5], threads).unwrap();
-    trial.most_moved(&[0, 5], threads).unwrap();
 }
 
 fn resect(threads: &Threads) {

@@ -148,7 +148,7 @@ class Reliability(Tabular):
 
     def _own_effects(self, groups: list[int], rows: Indices) -> Floats:
         errors = minimal_detectable_error(1.0, _shown(self.redundancy[rows]), self._delta)
-        return np.asarray(self.trial.core.effects(groups)[:, :3] * errors[:, np.newaxis])
+        return np.asarray(self.trial.core.effects(groups) * errors[:, np.newaxis])
 
     def own_points(self, groups: list[int], *, heights: bool = False) -> list[float]:
         """Return effects of detectable errors of the worst group rows on their points.

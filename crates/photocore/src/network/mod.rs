@@ -122,7 +122,6 @@ pub use passages::Passage;
 pub use predictions::{OnPoint, Prediction};
 #[doc(hidden)]
 pub use problem::Assembled;
-pub use responses::Moved;
 #[doc(hidden)]
 pub use selection::Selected;
 pub use selection::{Dropped, Reason};

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
 use photocore::network::hypotheses::{About, Facts, Hypotheses, Hypothesis};
-use photocore::network::{Excluded, Moved, Network, Of, Options, Outcome, Trial};
+use photocore::network::{Excluded, Network, Options, Outcome, Trial};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
@@ -107,9 +107,6 @@ impl NetworkTrial {
         Workers::of(self.threads, self.images)
     }
 }
-
-/// Unknown with the largest change: type, index, component, change, and change in standard deviations.
-type MovedRow = (&'static str, usize, usize, f64, f64);
 
 /// First and second group of pairs, and their correlation.
 type Pairs<'py> = (Bound<'py, PyArray1<i64>>, Bound<'py, PyArray1<i64>>, Vector<'py>);
@@ -263,20 +260,6 @@ impl NetworkTrial {
         let rows = self.trial.suspects().row_starts().last().copied().unwrap_or_default();
         let count = columns.len() / rows.max(1);
         PyArray1::from_vec(py, columns).reshape([count, rows])
-    }
-
-    fn most_moved(&self, py: Python<'_>, suspects: Vec<usize>) -> PyResult<Vec<MovedRow>> {
-        let found = watched(py, self.workers(), None, |pool, _| self.trial.most_moved(&suspects, pool))?;
-        let row = |moved: Moved| {
-            let (kind, index) = match moved.of {
-                Of::Photo(index) | Of::PhotoStep(index) => ("photo", index),
-                Of::Camera(index) => ("camera", index),
-                Of::Common(index) => ("unknown", index),
-                Of::Point(index) => ("point", index),
-            };
-            (kind, index, moved.component, moved.effect, moved.in_sd)
-        };
-        Ok(found.map_err(|error| (self.refused)(&error))?.into_iter().map(row).collect())
     }
 
     fn inseparable<'py>(&self, py: Python<'py>, points: Vec<usize>, limit: f64) -> PyResult<Pairs<'py>> {
