@@ -10,7 +10,7 @@ use super::input::{InnerConstraints, Network, NetworkDatum, Options, State};
 use super::model::Owner;
 use super::problem::Assembled;
 use super::solution::Solution;
-use super::suspects::Suspects;
+use super::test_groups::TestGroups;
 use crate::Threads;
 use crate::adjustment::{
     Adjusted, Adjustment, Classes, CofactorError, Datum, Linearized, Phase, Watch, between,
@@ -48,7 +48,7 @@ pub struct Covariances {
     pub(super) point: Vec<Option<usize>>,
     pub(super) photo_of_camera: Vec<Option<usize>>,
     pub(super) camera_of_photo: Vec<usize>,
-    pub(super) suspects: OnceLock<Arc<Suspects>>,
+    pub(super) groups: OnceLock<Arc<TestGroups>>,
     memory: Option<usize>,
 }
 
@@ -107,7 +107,7 @@ impl Network {
             point,
             photo_of_camera,
             camera_of_photo: self.photos.iter().map(|photo| photo.camera).collect(),
-            suspects: OnceLock::new(),
+            groups: OnceLock::new(),
             memory: options.memory,
         })
     }

@@ -13,7 +13,7 @@
 //! | tests of observations | `snooping`, `hypotheses`, `responses`, `predictions`, `group_tests` |
 //! | adjustment | `adjust` |
 //! | results | `groups`, `covariance`, `solution`, `visibility`, `weak_points`, `adjusted` |
-//! | trials without some observations | `trial`, `suspects` |
+//! | trials without some observations | `trial`, `test_groups` |
 //! | exclusion of points and photos | `screens` |
 //! | problem of least squares | `naming`, `datum`, `problem`, `layout`, `bundle`, `station_values` |
 //! | values and equations at given parameters | `evaluated`, `rigid_motions`, `diverging`, `passing`, `composed`, `in_lanes`, `precision`, `intersection`, `motions`, `weighted_angles` |
@@ -97,7 +97,7 @@ mod solution;
 mod station_values;
 mod stations;
 mod surroundings;
-mod suspects;
+mod test_groups;
 mod trial;
 mod visibility;
 mod weak_points;
@@ -108,7 +108,7 @@ pub use adjusted::{AdjustedCamera, AdjustedCommon, AdjustedPhoto, AdjustedPoint}
 pub use commons::{Common, CommonKind};
 pub use covariance::{Covariances, Of};
 pub use error::{Coarse, Combination, NetworkError, PosePart};
-pub use group_tests::Tests;
+pub use group_tests::{TestOfGroup, TestOfRow, Tests};
 pub use groups::Groups;
 pub use input::{
     Camera, Image, InnerConstraints, Minimum, Network, NetworkDatum, Options, Photo, Point, Screens, Start,
@@ -119,7 +119,7 @@ pub use intersection::meet;
 pub use mounts::{Mount, Trajectory};
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
 pub use passages::Passage;
-pub use predictions::{OnPoint, Prediction};
+pub use predictions::ResidualBlock;
 #[doc(hidden)]
 pub use problem::Assembled;
 #[doc(hidden)]
@@ -127,7 +127,7 @@ pub use selection::Selected;
 pub use selection::{Dropped, Reason};
 pub use solution::{DatumInForce, Joint, LEAST_REDUNDANCY, Solution, SumsByType, Weak};
 pub use surroundings::{BlockOf, Surroundings};
-pub use suspects::{Subject, Suspects};
+pub use test_groups::{GroupId, TestGroups, TestKind};
 pub use trial::{Converged, Excluded, Outcome, Trial};
 pub use visibility::Unseen;
 pub use weak_points::WeakPoint;

@@ -8,8 +8,9 @@ use nalgebra::DMatrix;
 
 use super::covariance::{Covariances, Of};
 use super::error::NetworkError;
-use super::predictions::{AT_LEAST, OnPoint};
-use super::suspects::Suspects;
+use super::group_tests::from_identity;
+use super::predictions::{AT_LEAST, ResidualBlock};
+use super::test_groups::TestGroups;
 use super::trial::Trial;
 use crate::adjustment::{
     AdjustError, Linearized, ObservationRows, correlation_above, leverage_odds, may_correlate, whitening,
@@ -22,12 +23,12 @@ const TOGETHER: usize = 16;
 
 impl Covariances {
     /// Returns the test groups of the network, in the order of all tests.
-    pub fn suspects(&self) -> &Arc<Suspects> {
-        let new = || Suspects::new(&self.assembled, self.images, &|photo| self.camera_of_photo[photo]);
-        self.suspects.get_or_init(|| Arc::new(new()))
+    pub fn groups(&self) -> &Arc<TestGroups> {
+        let new = || TestGroups::new(&self.assembled, self.images, &|photo| self.camera_of_photo[photo]);
+        self.groups.get_or_init(|| Arc::new(new()))
     }
 
-    /// Returns the effects of errors of one standard deviation in every row of [`Covariances::suspects`] on functions of the parameters:
+    /// Returns the effects of errors of one standard deviation in every row of [`Covariances::groups`] on functions of the parameters:
     /// one number per function and row.
     ///
     /// `partials`: partials of each function by the parameters of `of`, as in [`Covariances::propagate`].
@@ -44,12 +45,9 @@ impl Covariances {
         let solutions = self.solutions(partials, of, threads)?;
         let products =
             ObservationRows::products(problem, values, self.linearized.held(), &solutions, threads);
-        let (width, suspects) = (solutions.len(), self.suspects());
-        let rows = || suspects.rows_of(0..suspects.len());
-        Ok((0..width)
-            .flat_map(|k| rows().map(move |row| (row, k)))
-            .map(|(row, k)| products[row * width + k])
-            .collect())
+        let (width, equations) = (solutions.len(), self.groups().equations());
+        let of = |k: usize| equations.iter().map(move |&equation| (equation as usize, k));
+        Ok((0..width).flat_map(of).map(|(equation, k)| products[equation * width + k]).collect())
     }
 }
 
@@ -59,16 +57,16 @@ impl Trial {
     ///
     /// # Errors
     /// Responses before any adjustment; an interruption, insufficient memory.
-    pub fn responses(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<f64>, NetworkError> {
+    pub fn responses(&self, groups: &[usize], threads: &Threads) -> Result<Vec<f64>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let go_on = &mut |_| ControlFlow::Continue(());
         let failed = |error: AdjustError| NetworkError::new(error, &self.assembled);
         let (values, held) = (found.values.clone(), found.held.clone());
         let linearized = Linearized::form(problem, None, values, held, threads, go_on).map_err(failed)?;
         let equations = ObservationRows::new(problem, &found.values, &found.held, threads);
-        let (unknowns, starts) = (problem.layout().unknowns(), self.suspects.row_starts());
-        let all: Vec<usize> = self.suspects.rows_of(0..self.suspects.len()).collect();
-        let asked: Vec<usize> = suspects.iter().flat_map(|&index| starts[index]..starts[index + 1]).collect();
+        let unknowns = problem.layout().unknowns();
+        let all: Vec<usize> = self.groups.equations().iter().map(|&equation| equation as usize).collect();
+        let asked: Vec<usize> = groups.iter().flat_map(|&group| self.groups.rows(group)).collect();
         let mut columns = Vec::with_capacity(all.len() * asked.len());
         for some in asked.chunks(TOGETHER) {
             let rights: Vec<f64> = some.iter().flat_map(|&row| equations.right(all[row], unknowns)).collect();
@@ -87,10 +85,10 @@ impl Trial {
     ///
     /// # Errors
     /// Effects before any adjustment.
-    pub fn effects(&self, suspects: &[usize], threads: &Threads) -> Result<Vec<[f64; 3]>, NetworkError> {
+    pub fn effects(&self, groups: &[usize], threads: &Threads) -> Result<Vec<[f64; 3]>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let terms = self.terms(&problem.sd, &found.values);
-        let near = self.near(suspects, &problem.observation_sd, &terms, threads)?;
+        let near = self.near(groups, &problem.observation_sd, &terms, threads)?;
         let is_point = |block: Option<usize>| block.is_none_or(|block| block >= problem.model.stations());
         let effects = |own: &RowCofactors| -> Vec<[f64; 3]> {
             match own.blocks.iter().find(|(block, _)| is_point(*block)) {
@@ -111,24 +109,25 @@ impl Trial {
         limit: f64,
         threads: &Threads,
     ) -> Result<Vec<(usize, usize, f64)>, NetworkError> {
-        let on_points = self.on_points_above(points, limit, threads)?;
+        let on_points = self.on_points(points, (limit, false), threads)?;
         let pairs = |points: Range<usize>| -> Vec<(usize, usize, f64)> {
             on_points[points].iter().flat_map(|own| self.pairs_on(own, limit)).collect()
         };
         Ok(threads.install(|| parallel::by_parts(on_points.len(), AT_LEAST, &pairs)))
     }
 
-    fn pairs_on(&self, own: &OnPoint, limit: f64) -> Vec<(usize, usize, f64)> {
+    fn pairs_on(&self, own: &ResidualBlock, limit: f64) -> Vec<(usize, usize, f64)> {
         let count = own.residual.len();
-        let starts = self.suspects.starts_among(&own.suspects);
+        let starts = self.groups.starts_among(&own.groups);
         let block = |i: usize, j: usize| -> Vec<f64> {
             let rows = starts[i]..starts[i + 1];
             rows.flat_map(|row| own.cofactors[row * count..][starts[j]..starts[j + 1]].to_vec()).collect()
         };
         let mut found = vec![];
-        let is_in = |&k: &usize| self.suspects.get(own.suspects[k]).rows.iter().any(|&row| self.is_in(row));
-        let taking_part: Vec<usize> = (0..own.suspects.len()).filter(is_in).collect();
-        let alone: Vec<Vec<f64>> = (0..own.suspects.len()).map(|k| block(k, k)).collect();
+        let is_in =
+            |&k: &usize| self.groups.equations_of(own.groups[k]).iter().any(|&equation| self.is_in(equation));
+        let taking_part: Vec<usize> = (0..own.groups.len()).filter(is_in).collect();
+        let alone: Vec<Vec<f64>> = (0..own.groups.len()).map(|k| block(k, k)).collect();
         let odds: Vec<f64> = alone.iter().map(|cofactors| leverage_odds(from_identity(cofactors))).collect();
         let roots: Vec<DMatrix<f64>> = taking_part.iter().map(|&k| whitening(&alone[k])).collect();
         for (at, &j) in taking_part.iter().enumerate() {
@@ -140,16 +139,10 @@ impl Trial {
                 }
                 let rho = correlation_above(root, &roots[at], &between, limit);
                 if rho > limit {
-                    found.push((own.suspects[i], own.suspects[j], rho));
+                    found.push((own.groups[i], own.groups[j], rho));
                 }
             }
         }
         found
     }
-}
-
-/// Returns the elements of I - R for cofactors R of some residuals.
-fn from_identity(cofactors: &[f64]) -> impl Iterator<Item = f64> {
-    let next = cofactors.len().isqrt() + 1;
-    cofactors.iter().enumerate().map(move |(k, value)| f64::from(u8::from(k % next == 0)) - value)
 }

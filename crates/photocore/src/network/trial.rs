@@ -8,9 +8,11 @@ use nalgebra::{DMatrix, DVector};
 use super::error::NetworkError;
 use super::input::{Network, Options, State};
 use super::problem::Assembled;
-use super::suspects::{self, Home, Row, Subject, Suspect, Suspects};
+use super::test_groups::TestGroups;
 use crate::Threads;
-use crate::adjustment::{self, AdjustError, Leverages, Loss, Method, Requests, Status, Stop, Terms, Watch};
+use crate::adjustment::{
+    self, AdjustError, EquationOf, Leverages, Loss, Method, Requests, Status, Stop, Terms, Watch,
+};
 use crate::geometry::PoseNumbers;
 
 /// Repeated adjustments of a network without some of its observations.
@@ -18,7 +20,7 @@ use crate::geometry::PoseNumbers;
 pub struct Trial {
     pub(super) assembled: Assembled,
     options: adjustment::Options,
-    pub(super) suspects: Arc<Suspects>,
+    pub(super) groups: Arc<TestGroups>,
     /// Given standard deviations of the equations and parameters.
     pub(super) observation_sd: Vec<f64>,
     pub(super) sd: Vec<f64>,
@@ -128,7 +130,7 @@ impl Trial {
         found: Option<Leverages>,
     ) -> Self {
         let camera = |photo: usize| network.photos[photo].camera;
-        let suspects = Suspects::new(&assembled, network.images.len(), &camera);
+        let groups = TestGroups::new(&assembled, network.images.len(), &camera);
         let place = assembled.places(network.points.len());
         let mut own = *options;
         if let Method::Full(_) = own.method {
@@ -139,7 +141,7 @@ impl Trial {
             sd: assembled.problem.sd.clone(),
             options: own,
             assembled,
-            suspects: Arc::new(suspects),
+            groups: Arc::new(groups),
             place,
             camera_of_photo: network.photos.iter().map(|photo| photo.camera).collect(),
             held,
@@ -149,8 +151,8 @@ impl Trial {
     }
 
     /// Returns the test groups, in the order of all tests.
-    pub fn suspects(&self) -> &Arc<Suspects> {
-        &self.suspects
+    pub fn groups(&self) -> &Arc<TestGroups> {
+        &self.groups
     }
 
     /// Linearizes the complete network at the end of its adjustment.
@@ -224,12 +226,12 @@ impl Trial {
             return Ok(None);
         }
         let (groups, all) = (problem.layout().groups(), found.weights.unwrap_or_default());
-        let weight = |suspect: Suspect<'_>| match suspect.home {
-            Home::Group { group, .. } => all.get(group).copied(),
-            Home::Tie(tie) => all.get(groups + tie).copied(),
-            Home::Point(_) | Home::Block(_) => None,
+        let weight = |group: usize| match self.equation(self.groups.equations_of(group)[0]) {
+            EquationOf::Group { group, .. } => all.get(group).copied(),
+            EquationOf::Tie { tie, .. } => all.get(groups + tie).copied(),
+            EquationOf::Unknown(_) => None,
         };
-        let weights = self.suspects.all().map(|suspect| weight(suspect).unwrap_or(1.0)).collect();
+        let weights = (0..self.groups.len()).map(|group| weight(group).unwrap_or(1.0)).collect();
         self.assembled.problem.initial = found.unknowns;
         Ok(Some(weights))
     }
@@ -291,10 +293,10 @@ impl Trial {
         let Assembled { problem, .. } = &mut self.assembled;
         problem.observation_sd.clone_from(&self.observation_sd);
         problem.sd.clone_from(&self.sd);
-        let rows = self.suspects.rows_of(0..self.suspects.len());
-        for (row, _) in rows.zip(&out.rows).filter(|(_, out)| **out) {
-            match row.checked_sub(problem.observation_sd.len()) {
-                None => problem.observation_sd[row] = f64::INFINITY,
+        for (&equation, _) in self.groups.equations().iter().zip(&out.rows).filter(|(_, out)| **out) {
+            let equation = equation as usize;
+            match equation.checked_sub(problem.observation_sd.len()) {
+                None => problem.observation_sd[equation] = f64::INFINITY,
                 Some(unknown) => problem.sd[unknown] = f64::INFINITY,
             }
         }
@@ -323,32 +325,48 @@ impl Trial {
         Terms::new(&problem.model, values, &problem.prior, sd)
     }
 
-    /// Returns true if a row is active.
-    pub(super) fn is_in(&self, row: Row) -> bool {
-        match self.unknown_of(row) {
-            None => self.assembled.problem.observation_sd[row.0 as usize].is_finite(),
-            Some(unknown) => self.assembled.problem.is_weighted(unknown),
+    /// Returns the observation of an equation of a test group.
+    pub(super) fn equation(&self, equation: u32) -> EquationOf {
+        let (problem, equation) = (&self.assembled.problem, equation as usize);
+        let (layout, rows) = (problem.layout(), problem.layout().rows());
+        let ties = layout.groups() * rows;
+        if let Some(unknown) = equation.checked_sub(layout.equations()) {
+            EquationOf::Unknown(unknown)
+        } else if let Some(row) = equation.checked_sub(ties) {
+            let tie = layout.tie_with(row);
+            EquationOf::Tie { tie, row: row - layout.tie_rows(tie).start }
+        } else {
+            let group = equation / rows;
+            EquationOf::Group { group, local: problem.model.point_of(group), row: equation % rows }
         }
     }
 
-    /// Returns the parameter that a row observes; None for an equation.
-    pub(super) fn unknown_of(&self, row: Row) -> Option<usize> {
-        (row.0 as usize).checked_sub(self.observation_sd.len())
+    /// Returns true if an equation of a test group is active.
+    pub(super) fn is_in(&self, equation: u32) -> bool {
+        let problem = &self.assembled.problem;
+        match (equation as usize).checked_sub(problem.observation_sd.len()) {
+            None => problem.observation_sd[equation as usize].is_finite(),
+            Some(unknown) => problem.is_weighted(unknown),
+        }
     }
 
-    pub(super) fn deviation(&self, suspect: &Suspect<'_>, row: Row) -> f64 {
-        suspects::deviation(&self.assembled.problem.model, suspect, row, (&self.observation_sd, &self.sd))
+    /// Returns the index of an additional observation in the model; None for other test groups.
+    pub(super) fn observation(&self, group: usize) -> Option<usize> {
+        let tied_images = self.assembled.problem.model.tied_images();
+        match self.equation(self.groups.equations_of(group)[0]) {
+            EquationOf::Tie { tie, .. } => tie.checked_sub(tied_images),
+            _ => None,
+        }
     }
 
     /// Returns the matrix from whitened errors of some rows of a group to their units.
-    pub(super) fn units(&self, suspect: &Suspect<'_>, rows: &[Row]) -> DMatrix<f64> {
-        let model = &self.assembled.problem.model;
-        if let (Subject::Observation(_), Home::Tie(tie)) = (suspect.subject, suspect.home) {
-            let root = &model.observations[tie - model.tied_images()].root;
-            let components: Vec<usize> = rows.iter().map(|&(_, component)| component as usize).collect();
-            return root.select_rows(&components).select_columns(&components);
+    pub(super) fn units(&self, group: usize, rows: &[usize]) -> DMatrix<f64> {
+        if let Some(index) = self.observation(group) {
+            let root = &self.assembled.problem.model.observations[index].root;
+            return root.select_rows(rows).select_columns(rows);
         }
-        let sd = rows.iter().map(|&row| self.deviation(suspect, row));
-        DMatrix::from_diagonal(&DVector::from_iterator(rows.len(), sd))
+        let deviations = &self.groups.deviations()[self.groups.rows(group)];
+        let of_rows = rows.iter().map(|&row| deviations[row]);
+        DMatrix::from_diagonal(&DVector::from_iterator(rows.len(), of_rows))
     }
 }

@@ -64,7 +64,7 @@ pub fn refused(error: &Failure) -> PyErr {
 #[pymethods]
 impl BlockCovariances {
     fn suspects(&self, py: Python<'_>) -> NetworkSuspects {
-        py.detach(|| NetworkSuspects(self.covariances.suspects().clone()))
+        py.detach(|| NetworkSuspects(self.covariances.groups().clone()))
     }
 
     fn influences<'py>(

@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use numpy::PyArray1;
 use photocore::network::NetworkError as Failure;
+use photocore::network::TestKind;
 use photocore::network::snooping::{
     Consensus, Consequence, ControlParts, Kept, Log, Predicted, Remark, Removal, Round, Settings, Snooping,
     Standing,
@@ -13,7 +14,6 @@ use pyo3::types::PyDict;
 
 use super::trial::NetworkTrial;
 use crate::adjustment::{status_name, unknown};
-use crate::work::watched;
 
 /// Data snooping of a network; see the stub.
 #[pyclass(module = "photogram._photocore")]
@@ -30,11 +30,15 @@ type ConsensusRow = (Vec<usize>, BTreeSet<usize>);
 /// Code, and the groups, photos or values of it.
 type CodeRow = (&'static str, Vec<f64>);
 
-/// Type, and factor of its standard deviations.
-type FactorRow = (usize, f64);
+/// Number of a type, and factor of its standard deviations.
+type FactorRow = (u8, f64);
 
 fn standing_row(standing: Standing) -> StandingRow {
     (status_name(standing.status), standing.sum_of_squares, standing.degrees_of_freedom)
+}
+
+fn factor_rows(factors: Vec<(TestKind, f64)>) -> Vec<FactorRow> {
+    factors.into_iter().map(|(kind, factor)| (kind as u8, factor)).collect()
 }
 
 fn consensus_of((images, photos): ConsensusRow) -> Consensus {
@@ -54,7 +58,7 @@ fn consequence_row(consequence: Consequence) -> CodeRow {
 
 fn remark_row(remark: Remark) -> (&'static str, Vec<f64>, Vec<FactorRow>) {
     match remark {
-        Remark::Factors { overall, by_type } => ("factors", vec![overall], by_type),
+        Remark::Factors { overall, by_type } => ("factors", vec![overall], factor_rows(by_type)),
         Remark::Aside(points) => ("aside", vec![points as f64], vec![]),
         Remark::NotEnded => ("not-ended", vec![], vec![]),
         Remark::Consensus { is_adjusted, images, agreeing } => {
@@ -115,7 +119,7 @@ fn log_row(py: Python<'_>, log: Log) -> PyResult<Bound<'_, PyDict>> {
     row.set_item("tests", log.tests)?;
     row.set_item("before", standing_row(log.before))?;
     row.set_item("after", standing_row(log.after))?;
-    row.set_item("factors", log.factors)?;
+    row.set_item("factors", factor_rows(log.factors))?;
     row.set_item("active", PyArray1::from_vec(py, log.active))?;
     Ok(row)
 }
@@ -165,11 +169,8 @@ impl NetworkSnooping {
         (settings.max_rounds, settings.control, settings.is_supported) = (max_rounds, control, is_supported);
         (settings.rough, settings.exact, settings.max_rows) = (rough, exact, max_rows);
         let consensus = consensus.map(consensus_of);
-        let (workers, refused, own) = (trial.workers(), trial.refused, &mut trial.trial);
-        let found = watched(py, workers, None, |pool, watch| {
-            Snooping::new(own, settings, consensus.as_ref(), pool, watch)
-        })?;
-        Ok(Self { snooping: Some(found.map_err(|error| refused(&error))?) })
+        let snooping = trial.run(py, None, |network| Snooping::new(network, settings, consensus.as_ref()))?;
+        Ok(Self { snooping: Some(snooping) })
     }
 
     #[getter]
@@ -183,10 +184,7 @@ impl NetworkSnooping {
         mut trial: PyRefMut<'_, NetworkTrial>,
     ) -> PyResult<bool> {
         let snooping = self.state()?;
-        let (workers, refused, own) = (trial.workers(), trial.refused, &mut trial.trial);
-        let found =
-            watched(py, workers, None, |pool, watch| snooping.may_have_common_errors(own, pool, watch))?;
-        found.map_err(|error| refused(&error))
+        trial.run(py, None, |network| snooping.may_have_common_errors(network))
     }
 
     fn restart(
@@ -196,9 +194,7 @@ impl NetworkSnooping {
         consensus: ConsensusRow,
     ) -> PyResult<()> {
         let (snooping, consensus) = (self.state_mut()?, consensus_of(consensus));
-        let (workers, refused, own) = (trial.workers(), trial.refused, &mut trial.trial);
-        let found = watched(py, workers, None, |pool, watch| snooping.restart(own, &consensus, pool, watch))?;
-        found.map_err(|error| refused(&error))
+        trial.run(py, None, |network| snooping.restart(network, &consensus))
     }
 
     fn adjust_exactly(
@@ -207,16 +203,12 @@ impl NetworkSnooping {
         mut trial: PyRefMut<'_, NetworkTrial>,
     ) -> PyResult<StandingRow> {
         let snooping = self.state_mut()?;
-        let (workers, refused, own) = (trial.workers(), trial.refused, &mut trial.trial);
-        let found = watched(py, workers, None, |pool, watch| snooping.adjust_exactly(own, pool, watch))?;
-        found.map(standing_row).map_err(|error| refused(&error))
+        trial.run(py, None, |network| snooping.adjust_exactly(network)).map(standing_row)
     }
 
     fn run(&mut self, py: Python<'_>, mut trial: PyRefMut<'_, NetworkTrial>) -> PyResult<()> {
         let snooping = self.state_mut()?;
-        let (workers, refused, own) = (trial.workers(), trial.refused, &mut trial.trial);
-        let found = watched(py, workers, None, |pool, watch| snooping.run(own, pool, watch))?;
-        found.map_err(|error| refused(&error))
+        trial.run(py, None, |network| snooping.run(network))
     }
 
     fn finish<'py>(&mut self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {

@@ -4,24 +4,20 @@ use std::sync::Arc;
 
 use crate::arrays::Vector;
 use numpy::PyArray1;
-use photocore::network::{Subject, Suspects};
+use photocore::network::TestGroups;
 use pyo3::prelude::*;
 
 /// Groups of observations that are tested together.
 #[pyclass(module = "photogram._photocore", frozen)]
-pub struct NetworkSuspects(pub(super) Arc<Suspects>);
-
-/// Returns the number of the type, and the index.
-pub(super) fn subject(subject: Subject) -> (u8, i64) {
-    (subject.kind() as u8, subject.index() as i64)
-}
+pub struct NetworkSuspects(pub(super) Arc<TestGroups>);
 
 #[pymethods]
 impl NetworkSuspects {
     #[getter]
     fn subjects<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<u8>>, Bound<'py, PyArray1<i64>>) {
-        let (kinds, indices): (Vec<u8>, Vec<i64>) = self.0.subjects().map(subject).unzip();
-        (PyArray1::from_vec(py, kinds), PyArray1::from_vec(py, indices))
+        let ids = self.0.ids().iter();
+        let kinds = ids.clone().map(|id| id.kind as u8);
+        (PyArray1::from_iter(py, kinds), PyArray1::from_iter(py, ids.map(|id| i64::from(id.index))))
     }
 
     #[getter]
@@ -32,7 +28,7 @@ impl NetworkSuspects {
 
     #[getter]
     fn components<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i64>> {
-        PyArray1::from_vec(py, self.0.components().map(|component| component as i64).collect())
+        PyArray1::from_iter(py, self.0.components().iter().map(|&component| i64::from(component)))
     }
 
     #[getter]

@@ -1,14 +1,16 @@
 //! Outlier session: a network adjusted without some of its observations.
 
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1};
+use photocore::Threads;
 use photocore::network::hypotheses::{About, Facts, Hypotheses, Hypothesis};
-use photocore::network::{Excluded, Network, Options, Outcome, Trial};
+use photocore::network::snooping::Session;
+use photocore::network::{Excluded, Network, NetworkError as Failure, Options, Outcome, Tests, Trial};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::covariances::Refused;
 use super::state::BlockState;
-use super::suspects::{NetworkSuspects, subject};
+use super::suspects::NetworkSuspects;
 use crate::adjustment::status_name;
 use crate::arrays::{Array, Matrix, Vector, rows, table};
 use crate::work::{Workers, watched};
@@ -16,12 +18,12 @@ use crate::work::{Workers, watched};
 /// Network that is adjusted without some of its observations.
 #[pyclass(module = "photogram._photocore")]
 pub struct NetworkTrial {
-    pub(super) trial: Trial,
+    trial: Trial,
     images: usize,
     /// Number of photos without trajectory records.
     photos: usize,
     threads: usize,
-    pub(super) refused: Refused,
+    refused: Refused,
 }
 
 /// Status, iterations, weighted sum of squares, degrees of freedom, points that collapsed into a station.
@@ -43,8 +45,7 @@ fn hypothesis_columns(py: Python<'_>, found: Hypotheses) -> PyResult<Bound<'_, P
     let numbers = |own: &Hypothesis| match own.about {
         About::Set(set) => [-1, set.map_or(-1, |set| set as i64), -1],
         About::Group(group, component) => {
-            let (kind, index) = subject(group);
-            [i64::from(kind), index, component.map_or(-1, |component| component as i64)]
+            [group.kind as i64, i64::from(group.index), component.map_or(-1, |component| component as i64)]
         }
     };
     for (k, name) in ["group", "index", "component"].into_iter().enumerate() {
@@ -103,8 +104,27 @@ fn hypothesis_columns(py: Python<'_>, found: Hypotheses) -> PyResult<Bound<'_, P
 }
 
 impl NetworkTrial {
-    pub(super) fn workers(&self) -> Workers {
-        Workers::of(self.threads, self.images)
+    /// Runs work that only reads the trial, without the GIL.
+    fn query<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&Trial, &Threads) -> Result<T, Failure> + Send,
+    ) -> PyResult<T> {
+        let workers = Workers::of(self.threads, self.images);
+        watched(py, workers, None, |pool, _| work(&self.trial, pool))?.map_err(|error| (self.refused)(&error))
+    }
+
+    /// Runs work on the trial without the GIL.
+    pub(super) fn run<T: Send>(
+        &mut self,
+        py: Python<'_>,
+        progress: Option<Py<PyAny>>,
+        work: impl FnOnce(&mut Session<'_>) -> Result<T, Failure> + Send,
+    ) -> PyResult<T> {
+        let (workers, trial) = (Workers::of(self.threads, self.images), &mut self.trial);
+        let found =
+            watched(py, workers, progress, |threads, watch| work(&mut Session { trial, threads, watch }))?;
+        found.map_err(|error| (self.refused)(&error))
     }
 }
 
@@ -141,7 +161,7 @@ pub fn tried(
 impl NetworkTrial {
     #[getter]
     fn suspects(&self) -> NetworkSuspects {
-        NetworkSuspects(self.trial.suspects().clone())
+        NetworkSuspects(self.trial.groups().clone())
     }
 
     #[getter]
@@ -157,9 +177,7 @@ impl NetworkTrial {
     }
 
     fn stand(&mut self, py: Python<'_>) -> PyResult<OutcomeRow> {
-        let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
-        let found = watched(py, workers, None, |pool, watch| trial.stand(pool, watch))?;
-        found.map(outcome_row).map_err(|error| refused(&error))
+        self.run(py, None, |own| own.trial.stand(own.threads, own.watch)).map(outcome_row)
     }
 
     #[pyo3(signature = (rows, points, photos, *, tolerance, progress))]
@@ -177,29 +195,24 @@ impl NetworkTrial {
             points: points.into_iter().collect(),
             photos: photos.into_iter().collect(),
         };
-        let (workers, refused, trial) = (self.workers(), self.refused, &mut self.trial);
-        let found = watched(py, workers, progress, |pool, watch| trial.adjust(&out, tolerance, pool, watch))?;
-        found.map(outcome_row).map_err(|error| refused(&error))
+        let adjusted =
+            self.run(py, progress, |own| own.trial.adjust(&out, tolerance, own.threads, own.watch))?;
+        Ok(outcome_row(adjusted))
     }
 
     fn tests<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let found = watched(py, self.workers(), None, |pool, _| self.trial.tests(false, pool))?;
-        let tests = found.map_err(|error| (self.refused)(&error))?;
+        let tests = self.query(py, |trial, pool| trial.tests(false, pool))?;
         let all = PyDict::new(py);
         all.set_item("redundancy", PyArray1::from_vec(py, self.trial.redundancy(&tests)))?;
-        all.set_item("active", PyArray1::from_vec(py, tests.active))?;
-        let rank = tests.rank.into_iter().map(|rank| rank as i64).collect();
-        all.set_item("rank", PyArray1::from_vec(py, rank))?;
-        for (name, values) in [
-            ("statistic", tests.statistic),
-            ("least", tests.least),
-            ("residual", tests.residual),
-            ("cofactors", tests.cofactors),
-            ("error", tests.error),
-            ("error_sd", tests.error_sd),
-        ] {
-            all.set_item(name, PyArray1::from_vec(py, values))?;
-        }
+        let Tests { groups, rows, cofactors } = tests;
+        all.set_item("active", PyArray1::from_iter(py, groups.iter().map(|own| own.active)))?;
+        all.set_item("rank", PyArray1::from_iter(py, groups.iter().map(|own| own.rank as i64)))?;
+        all.set_item("statistic", PyArray1::from_iter(py, groups.iter().map(|own| own.statistic)))?;
+        all.set_item("least", PyArray1::from_iter(py, groups.iter().map(|own| own.least)))?;
+        all.set_item("residual", PyArray1::from_iter(py, rows.iter().map(|own| own.residual)))?;
+        all.set_item("error", PyArray1::from_iter(py, rows.iter().map(|own| own.error)))?;
+        all.set_item("error_sd", PyArray1::from_iter(py, rows.iter().map(|own| own.error_sd)))?;
+        all.set_item("cofactors", PyArray1::from_vec(py, cofactors))?;
         Ok(all)
     }
 
@@ -245,27 +258,22 @@ impl NetworkTrial {
             limit,
             effects,
         };
-        let found = watched(py, self.workers(), None, |pool, _| self.trial.hypotheses(&facts, pool))?;
-        hypothesis_columns(py, found.map_err(|error| (self.refused)(&error))?)
+        hypothesis_columns(py, self.query(py, |trial, pool| trial.hypotheses(&facts, pool))?)
     }
 
     fn effects<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Matrix<'py>> {
-        let found = watched(py, self.workers(), None, |pool, _| self.trial.effects(&suspects, pool))?;
-        table(py, found.map_err(|error| (self.refused)(&error))?)
+        table(py, self.query(py, |trial, pool| trial.effects(&suspects, pool))?)
     }
 
     fn responses<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Matrix<'py>> {
-        let found = watched(py, self.workers(), None, |pool, _| self.trial.responses(&suspects, pool))?;
-        let columns = found.map_err(|error| (self.refused)(&error))?;
-        let rows = self.trial.suspects().row_starts().last().copied().unwrap_or_default();
+        let columns = self.query(py, |trial, pool| trial.responses(&suspects, pool))?;
+        let rows = self.trial.groups().row_starts().last().copied().unwrap_or_default();
         let count = columns.len() / rows.max(1);
         PyArray1::from_vec(py, columns).reshape([count, rows])
     }
 
     fn inseparable<'py>(&self, py: Python<'py>, points: Vec<usize>, limit: f64) -> PyResult<Pairs<'py>> {
-        let found =
-            watched(py, self.workers(), None, |pool, _| self.trial.inseparable(&points, limit, pool))?;
-        let pairs = found.map_err(|error| (self.refused)(&error))?;
+        let pairs = self.query(py, |trial, pool| trial.inseparable(&points, limit, pool))?;
         let groups = |of: fn(&(usize, usize, f64)) -> usize| {
             PyArray1::from_iter(py, pairs.iter().map(|pair| of(pair) as i64))
         };

@@ -2,7 +2,6 @@
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::super::suspects::Home;
 use super::super::trial::Trial;
 use super::facts::Facts;
 use crate::Threads;
@@ -62,7 +61,7 @@ impl<'a> Sample<'a> {
         // Behind the others, which alone are counted.
         locals.extend(places.iter().flatten().filter(|&&place| place < model.locals));
         let of = |place: usize| {
-            let q = trial.cofactors_at(found, Home::Point(place));
+            let q = trial.cofactors_of_point(found, place);
             (points[place], Vector3::from_fn(|k, _| q[(k, k)].max(0.0).sqrt()))
         };
         let share = model.locals as f64 / interval as f64;

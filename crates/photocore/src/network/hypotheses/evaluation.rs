@@ -43,7 +43,7 @@ impl Trial {
     /// Tests all hypotheses of the catalogue at the adjusted values, and computes what an undetected error would change.
     ///
     /// Errors of sets are tested by their scores and solutions with one factor, errors of groups by the selected inverse; groups are those
-    /// of [`crate::network::Suspects`] except image observations, which [`Trial::tests`] has.
+    /// of [`crate::network::TestGroups`] except image observations, which [`Trial::tests`] has.
     ///
     /// # Errors
     /// Nothing was adjusted before; an interruption, no memory.
@@ -53,7 +53,7 @@ impl Trial {
         let linearized = found.linearized(problem, threads).map_err(failed)?;
         let criteria = Criteria::new(facts);
         let sample = Sample::new(self, found, &linearized, facts);
-        let mut singles = single_errors(self, found, &criteria, threads);
+        let mut singles = single_errors(self, &criteria, threads);
         let worst = worst(&singles, facts);
 
         let mut catalogue = catalogue(self, found, facts);
@@ -115,7 +115,7 @@ impl Trial {
         let changes = sample.changes(&catalogue, &sums.effects, &errors, threads);
         let effect = |error: usize| {
             let single = error.checked_sub(sets).map(|k| &singles[worst[k]]);
-            let own = single.map_or(vec![], |single| self.points_of(&single.suspect));
+            let own = single.map_or(vec![], |single| self.points_of(single.group));
             sample.effect(&changes, error, &own)
         };
         let effects = threads.install(|| parallel::map(errors.len(), 1, effect));

@@ -1,6 +1,6 @@
 //! A hypothesis, tested and with its effect.
 
-use super::super::Subject;
+use super::super::GroupId;
 use super::effect::Effect;
 use super::judged::Judged;
 
@@ -8,7 +8,7 @@ use super::judged::Judged;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum About {
     /// A group of observations, or one of its components.
-    Group(Subject, Option<usize>),
+    Group(GroupId, Option<usize>),
     /// A set of the facts, or a camera; None for all.
     Set(Option<usize>),
 }

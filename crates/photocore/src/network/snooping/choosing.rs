@@ -10,8 +10,8 @@
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
 use super::super::NetworkError;
-use super::super::group_tests::Tests;
-use super::super::predictions::OnPoint;
+use super::super::group_tests::{TestOfGroup, Tests};
+use super::super::predictions::ResidualBlock;
 use super::conditional::{Chosen, Conditional};
 use super::groups::Groups;
 use super::tried::Tried;
@@ -45,9 +45,12 @@ impl Choosing<'_> {
         if !self.groups.is_small {
             return self.bounded(network);
         }
-        let residual = self.tests.residual.clone();
-        let block =
-            OnPoint { suspects: (0..self.groups.len()).collect(), residual, cofactors: network.responses()? };
+        let residual = self.tests.rows.iter().map(|row| row.residual).collect();
+        let block = ResidualBlock {
+            groups: (0..self.groups.len()).collect(),
+            residual,
+            cofactors: network.responses()?,
+        };
         Ok(self.sequence(self.in_use(block), self.unit, usize::MAX))
     }
 
@@ -58,10 +61,10 @@ impl Choosing<'_> {
         network: &mut dyn Tried,
         points: &[usize],
     ) -> Result<(Vec<Chosen>, BTreeSet<usize>), NetworkError> {
-        let mut blocks = network.on_gone_points(points)?;
-        blocks.retain(|own| !own.suspects.is_empty());
-        let tested = blocks.iter().filter_map(|own| self.groups.point(own.suspects[0])).collect();
-        let with_own = |own: OnPoint| {
+        let mut blocks = network.on_points(points, true)?;
+        blocks.retain(|own| !own.groups.is_empty());
+        let tested = blocks.iter().filter_map(|own| self.groups.point(own.groups[0])).collect();
+        let with_own = |own: ResidualBlock| {
             let test = GroupTest::new(&own.residual, &own.cofactors, None);
             let (sum, freedom) = (self.unit.sum + test.statistic, self.unit.freedom + test.rank as f64);
             (own, UnitWeight { sum, freedom, ..self.unit })
@@ -70,10 +73,13 @@ impl Choosing<'_> {
     }
 
     /// Returns a block with zeros for excluded rows.
-    fn in_use(&self, mut block: OnPoint) -> OnPoint {
-        let rows = block.suspects.iter().flat_map(|&group| self.groups.rows(group));
-        let out: Vec<usize> =
-            rows.enumerate().filter(|&(_, row)| self.tests.residual[row].is_nan()).map(|(k, _)| k).collect();
+    fn in_use(&self, mut block: ResidualBlock) -> ResidualBlock {
+        let rows = block.groups.iter().flat_map(|&group| self.groups.rows(group));
+        let out: Vec<usize> = rows
+            .enumerate()
+            .filter(|&(_, row)| self.tests.rows[row].residual.is_nan())
+            .map(|(k, _)| k)
+            .collect();
         let count = block.residual.len();
         for k in out {
             block.residual[k] = 0.0;
@@ -84,7 +90,7 @@ impl Choosing<'_> {
     }
 
     /// Selects groups of a block while the next is significant, or masks one that is.
-    fn sequence(&self, block: OnPoint, unit: UnitWeight, most: usize) -> Vec<Chosen> {
+    fn sequence(&self, block: ResidualBlock, unit: UnitWeight, most: usize) -> Vec<Chosen> {
         let mut conditional = Conditional::new(block, self.groups, self.scales, unit);
         let mut is_allowed: Vec<bool> =
             conditional.groups().iter().map(|&group| self.is_allowed[group]).collect();
@@ -103,7 +109,7 @@ impl Choosing<'_> {
             }
             let rows = conditional.rows_to_exclude(place);
             let mut next = conditional.exclude(place, &rows, &is_allowed, limit);
-            next.first_statistic = self.tests.statistic[next.group];
+            next.first_statistic = self.tests.groups[next.group].statistic;
             is_allowed[place] = false;
             chosen.push(next);
             if is_significant {
@@ -121,7 +127,7 @@ impl Choosing<'_> {
         let mut candidates: Vec<usize> =
             allowed().filter(|&group| is_beyond(self.tests, self.scales, &mut critical, group)).collect();
         if candidates.is_empty() && self.ahead {
-            let ratio = |group: usize| self.tests.statistic[group] / self.scales[group];
+            let ratio = |group: usize| self.tests.groups[group].statistic / self.scales[group];
             let mut all: Vec<(f64, usize)> = allowed().map(|group| (-ratio(group), group)).collect();
             let most = AHEAD.min(all.len());
             if most > 0 {
@@ -154,29 +160,29 @@ impl Choosing<'_> {
         let of_point = |&group: &usize| self.groups.point(group).is_none_or(|point| seen.insert(point));
         let first: Vec<usize> = candidates.iter().copied().filter(of_point).collect();
         let points: Vec<usize> = first.iter().filter_map(|&group| self.groups.point(group)).collect();
-        let mut on_points = network.on_points(&points)?.into_iter();
+        let mut on_points = network.on_points(&points, false)?.into_iter();
         let blocks = first.into_iter().map(|group| {
             let of_point = self.groups.point(group).and_then(|_| on_points.next());
-            let block = of_point.filter(|own| !own.suspects.is_empty()).map(|own| self.in_use(own));
+            let block = of_point.filter(|own| !own.groups.is_empty()).map(|own| self.in_use(own));
             (block.unwrap_or_else(|| self.block_of(group)), self.unit)
         });
         Ok(self.on_blocks(blocks.collect(), ON_POINT))
     }
 
-    fn block_of(&self, group: usize) -> OnPoint {
+    fn block_of(&self, group: usize) -> ResidualBlock {
         let size = self.groups.rows(group).len();
         let cofactors = &self.tests.cofactors[self.groups.table.block_starts()[group]..][..size * size];
-        let residual = self.tests.residual[self.groups.rows(group)].iter();
-        let residual = residual.map(|value| if value.is_nan() { 0.0 } else { *value }).collect();
-        OnPoint { suspects: vec![group], residual, cofactors: cofactors.to_vec() }
+        let residual = self.tests.rows[self.groups.rows(group)].iter().map(|row| row.residual);
+        let residual = residual.map(|value| if value.is_nan() { 0.0 } else { value }).collect();
+        ResidualBlock { groups: vec![group], residual, cofactors: cofactors.to_vec() }
     }
 
     /// Selects in each of some blocks; blocks of equal sizes of groups in sequence.
-    fn on_blocks(&self, blocks: Vec<(OnPoint, UnitWeight)>, most: usize) -> Vec<Chosen> {
+    fn on_blocks(&self, blocks: Vec<(ResidualBlock, UnitWeight)>, most: usize) -> Vec<Chosen> {
         let mut classes: HashMap<Vec<usize>, usize> = HashMap::new();
         let mut by_class: BTreeMap<usize, Vec<Chosen>> = BTreeMap::new();
         for (block, unit) in blocks {
-            let sizes = block.suspects.iter().map(|&group| self.groups.rows(group).len()).collect();
+            let sizes = block.groups.iter().map(|&group| self.groups.rows(group).len()).collect();
             let number = classes.len();
             let class = *classes.entry(sizes).or_insert(number);
             by_class.entry(class).or_default().extend(self.sequence(block, unit, most));
@@ -187,7 +193,8 @@ impl Choosing<'_> {
 
 /// Returns whether T of a group exceeds its critical value.
 pub(super) fn is_beyond(tests: &Tests, scales: &[f64], critical: &mut Criticals, group: usize) -> bool {
-    tests.rank[group] > 0 && tests.statistic[group] > critical.of(tests.rank[group]) * scales[group]
+    let TestOfGroup { rank, statistic, .. } = tests.groups[group];
+    rank > 0 && statistic > critical.of(rank) * scales[group]
 }
 
 /// Bound of the effects on other test values by photo: the sum of sqrt(h_i T_i).
@@ -199,7 +206,7 @@ struct Load<'a> {
 
 impl Load<'_> {
     fn shared(&self, group: usize) -> f64 {
-        let shared = self.tests.shared[group];
+        let shared = self.tests.groups[group].shared;
         if shared.is_nan() { 0.0 } else { shared }
     }
 

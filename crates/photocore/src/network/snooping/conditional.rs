@@ -8,7 +8,7 @@
 
 use nalgebra::DMatrix;
 
-use super::super::predictions::OnPoint;
+use super::super::predictions::ResidualBlock;
 use super::groups::Groups;
 use super::log::Rival;
 use super::unit_weight::UnitWeight;
@@ -52,7 +52,7 @@ struct Value {
 
 /// Groups with the cofactors of all their residuals.
 pub(super) struct Conditional<'a> {
-    block: OnPoint,
+    block: ResidualBlock,
     /// First row of each group, and the number of rows at the end.
     starts: Vec<usize>,
     groups: &'a Groups,
@@ -63,8 +63,8 @@ pub(super) struct Conditional<'a> {
 }
 
 impl<'a> Conditional<'a> {
-    pub fn new(block: OnPoint, groups: &'a Groups, scales: &'a [f64], unit: UnitWeight) -> Self {
-        let starts = groups.table.starts_among(&block.suspects);
+    pub fn new(block: ResidualBlock, groups: &'a Groups, scales: &'a [f64], unit: UnitWeight) -> Self {
+        let starts = groups.table.starts_among(&block.groups);
         let mut new = Self { block, starts, groups, scales, unit, values: vec![] };
         new.test_all();
         new
@@ -72,11 +72,11 @@ impl<'a> Conditional<'a> {
 
     /// Returns the groups of the block.
     pub fn groups(&self) -> &[usize] {
-        &self.block.suspects
+        &self.block.groups
     }
 
     fn group(&self, place: usize) -> usize {
-        self.block.suspects[place]
+        self.block.groups[place]
     }
 
     pub fn scale(&self, place: usize) -> f64 {
@@ -94,7 +94,7 @@ impl<'a> Conditional<'a> {
             let (test, log_probability) = self.test(&rows, self.scale(place));
             Value { statistic: test.statistic, dimension: test.rank, log_probability }
         };
-        self.values = (0..self.block.suspects.len()).map(value).collect();
+        self.values = (0..self.block.groups.len()).map(value).collect();
     }
 
     /// Tests some rows of the block.
@@ -177,7 +177,7 @@ impl<'a> Conditional<'a> {
     }
 
     fn condition(&mut self, rows: &[usize]) {
-        let OnPoint { residual: v, cofactors: r, .. } = &mut self.block;
+        let ResidualBlock { residual: v, cofactors: r, .. } = &mut self.block;
         let count = v.len();
         let eigen =
             DMatrix::from_fn(rows.len(), rows.len(), |i, j| r[rows[i] * count + rows[j]]).symmetric_eigen();

@@ -10,8 +10,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::super::NetworkError;
-use super::super::group_tests::Tests;
-use super::super::predictions::Prediction;
+use super::super::group_tests::{TestOfGroup, Tests};
 use super::super::trial::Excluded;
 use super::choosing::Choosing;
 use super::groups::Groups;
@@ -135,30 +134,28 @@ impl Snooping {
         let limit = self.level.limit(0).ln();
         let freedom = self.standing.degrees_of_freedom.max(1) as f64;
         let variance = self.standing.sum_of_squares / freedom;
-        let entry = |(&group, own): (&usize, Option<Prediction>)| {
-            let own = own?;
-            let first = self.groups.rows(group).start;
-            let dimension = own.rows.len();
-            let log_probability = self.log_probability(own.statistic, dimension, group);
-            let fisher = own.statistic / dimension as f64 / variance;
-            let single = |k: usize| self.log_probability((own.error[k] / own.error_sd[k]).powi(2), 1, group);
-            let mut rows: Vec<usize> = (0..dimension).collect();
+        let (predictions, starts) = (network.predictions(groups)?, self.groups.table.starts_among(groups));
+        let entry = |k: usize| {
+            let (group, own) = (groups[k], &predictions.rows[starts[k]..starts[k + 1]]);
+            let TestOfGroup { active, statistic, rank: dimension, .. } = predictions.groups[k];
+            let log_probability = self.log_probability(statistic, dimension, group);
+            let fisher = statistic / dimension as f64 / variance;
+            let single = |row: usize| {
+                self.log_probability((own[row].error / own[row].error_sd).powi(2), 1, group) < limit
+            };
+            let mut rows: Vec<usize> = (0..own.len()).filter(|&row| !own[row].error.is_nan()).collect();
             if self.groups.control == ControlParts::Components && !self.groups.is_image(group) {
-                rows.retain(|&k| single(k) < limit);
+                rows.retain(|&row| single(row));
             }
-            (log_probability < limit && !rows.is_empty()).then(|| Removal {
+            let first = self.groups.rows(group).start;
+            (active && log_probability < limit && !rows.is_empty()).then(|| Removal {
                 fisher: if variance > 0.0 { fisher } else { f64::NAN },
                 log_probability,
-                error: rows.iter().map(|&k| own.error[k]).collect(),
-                error_sd: rows.iter().map(|&k| own.error_sd[k]).collect(),
-                ..self.entry(
-                    group,
-                    rows.iter().map(|&k| first + own.rows[k]).collect(),
-                    own.statistic,
-                    dimension,
-                )
+                error: rows.iter().map(|&row| own[row].error).collect(),
+                error_sd: rows.iter().map(|&row| own[row].error_sd).collect(),
+                ..self.entry(group, rows.iter().map(|row| first + row).collect(), statistic, dimension)
             })
         };
-        Ok(groups.iter().zip(network.predictions(groups)?).filter_map(entry).collect())
+        Ok((0..groups.len()).filter_map(entry).collect())
     }
 }

@@ -60,20 +60,21 @@ impl Snooping {
     fn insignificant_without(&self, group: usize, before: &Tests) -> Vec<Rival> {
         let mut critical = Criticals::new(self.unit(), self.level.limit(0));
         let mut falls = |other: usize| {
-            self.tests.active[other]
+            self.tests.groups[other].active
                 && !self.groups.is_image(other)
                 && self.groups.is_removable(other)
                 && is_beyond(before, &self.scales, &mut critical, other)
                 && !is_beyond(&self.tests, &self.scales, &mut critical, other)
                 && !self.removals.iter().any(|entry| entry.is_out() && entry.group == other)
         };
-        let change =
-            |other: usize| (before.statistic[group] - before.statistic[other]) / self.scales[group] / 2.0;
+        let change = |other: usize| {
+            (before.groups[group].statistic - before.groups[other].statistic) / self.scales[group] / 2.0
+        };
         let near = (0..self.groups.len()).filter(|&other| falls(other) && change(other).abs() < ODDS.ln());
         near.map(|other| Rival {
             group: other,
-            statistic: before.statistic[other],
-            dimension: before.rank[other],
+            statistic: before.groups[other].statistic,
+            dimension: before.groups[other].rank,
             odds: change(other).exp(),
         })
         .collect()

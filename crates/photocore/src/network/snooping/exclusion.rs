@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::super::NetworkError;
-use super::super::group_tests::Tests;
+use super::super::group_tests::{TestOfGroup, Tests};
 use super::super::trial::Excluded;
 use super::conditional::Chosen;
 use super::log::{Consequence, Kept, Removal};
@@ -178,11 +178,11 @@ impl Snooping {
     /// Returns the entry of a group that is excluded without a separate test.
     pub(super) fn untested_entry(&self, group: usize, tests: &Tests) -> Removal {
         let rows = self.groups.rows(group);
-        let (statistic, dimension) = (tests.statistic[group], tests.rank[group]);
+        let TestOfGroup { statistic, rank: dimension, .. } = tests.groups[group];
         Removal {
             fisher: self.unit().fisher(statistic, dimension),
-            error: tests.error[rows.clone()].to_vec(),
-            error_sd: tests.error_sd[rows.clone()].to_vec(),
+            error: tests.rows[rows.clone()].iter().map(|row| row.error).collect(),
+            error_sd: tests.rows[rows.clone()].iter().map(|row| row.error_sd).collect(),
             ..self.entry(group, rows.collect(), statistic, dimension)
         }
     }
@@ -202,7 +202,7 @@ impl Snooping {
             limit: self.level.limit(0),
             error: vec![],
             error_sd: vec![],
-            redundancy: self.tests.least[group],
+            redundancy: self.tests.groups[group].least,
             rivals: vec![],
             consequences: vec![],
             prediction: None,

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use super::super::mounts::Mounts;
-use super::super::suspects::{Home, Subject, Suspect, Suspects};
+use super::super::test_groups::{TestGroups, TestKind};
 use super::super::trial::{Excluded, Trial};
 use super::settings::{ControlParts, Settings};
 
@@ -23,7 +23,7 @@ struct Objects {
 /// Groups of observations of a network.
 #[derive(Debug, Clone)]
 pub(super) struct Groups {
-    pub table: Arc<Suspects>,
+    pub table: Arc<TestGroups>,
     pub control: ControlParts,
     /// Whether the cofactors of all rows together are small enough to be computed.
     pub is_small: bool,
@@ -38,8 +38,7 @@ pub(super) struct Groups {
 
 impl Groups {
     pub fn new(trial: &Trial, settings: &Settings) -> Self {
-        let (suspects, model) = (trial.suspects(), &trial.assembled.problem.model);
-        let mounts = &model.mounts;
+        let (table, mounts) = (trial.groups(), &trial.assembled.problem.model.mounts);
         let photos = settings.is_supported.len();
         let mut on_trajectories = vec![vec![]; mounts.trajectories().len()];
         for photo in 0..photos {
@@ -47,27 +46,25 @@ impl Groups {
                 on_trajectories[trajectory].push(photo);
             }
         }
-        let is_observation = |suspect: &Suspect<'_>| matches!(suspect.subject, Subject::Observation(_));
-        let of = |suspect: Suspect<'_>| match suspect.home {
-            Home::Tie(tie) if is_observation(&suspect) => objects(trial, tie - model.tied_images(), photos),
-            _ => Objects::default(),
-        };
+        let observations = table.of_kind(TestKind::Observation);
+        let first_observation = observations.start;
+        let of = |group: usize| Some(objects(trial, trial.observation(group)?, photos));
         Self {
-            objects: suspects.all().filter(is_observation).map(of).collect(),
-            first_observation: suspects.all().position(|own| is_observation(&own)).unwrap_or(suspects.len()),
+            objects: observations.map(|group| of(group).unwrap_or_default()).collect(),
+            first_observation,
             on_trajectories,
             control: settings.control,
-            is_small: suspects.row_starts()[suspects.len()] <= settings.max_rows,
+            is_small: table.row_starts()[table.len()] <= settings.max_rows,
             is_supported: settings.is_supported.clone(),
-            table: suspects.clone(),
+            table: table.clone(),
         }
     }
 
     /// Returns observations of unit weight, each a group, without points and photos.
     #[cfg(test)]
-    pub fn of_single_rows(count: usize, subject: fn(usize) -> Subject) -> Self {
+    pub fn of_single_rows(count: usize, kind: TestKind) -> Self {
         Self {
-            table: Arc::new(Suspects::of_single_rows(count, subject)),
+            table: Arc::new(TestGroups::of_single_rows(count, kind)),
             control: ControlParts::default(),
             is_small: true,
             is_supported: vec![],
@@ -91,29 +88,24 @@ impl Groups {
     }
 
     pub fn point(&self, group: usize) -> Option<usize> {
-        self.table.get(group).point
+        self.table.point(group)
     }
 
     pub fn photo(&self, group: usize) -> Option<usize> {
-        self.table.get(group).photo
+        self.table.photo(group)
     }
 
-    fn subject(&self, group: usize) -> Subject {
-        self.table.get(group).subject
-    }
-
-    /// Returns the type of a group; see [`Subject::kind`].
-    pub fn kind(&self, group: usize) -> usize {
-        self.subject(group).kind()
+    pub fn kind(&self, group: usize) -> TestKind {
+        self.table.kind(group)
     }
 
     pub fn is_image(&self, group: usize) -> bool {
-        matches!(self.subject(group), Subject::Image(_))
+        self.kind(group) == TestKind::Image
     }
 
     /// Returns whether data snooping may exclude a group.
     pub fn is_removable(&self, group: usize) -> bool {
-        !matches!(self.subject(group), Subject::Camera(_) | Subject::Common(_))
+        !matches!(self.kind(group), TestKind::Camera | TestKind::Common)
     }
 
     fn photos_of_point(&self, point: usize) -> impl Iterator<Item = usize> {
@@ -156,14 +148,14 @@ impl Groups {
             return None;
         }
         let single = (0..count).map(|row| vec![row]);
-        match (self.subject(group), self.control) {
-            (Subject::Control(_), ControlParts::PlanAndHeight) if count == 3 => {
+        match (self.kind(group), self.control) {
+            (TestKind::Control, ControlParts::PlanAndHeight) if count == 3 => {
                 Some(vec![vec![0, 1, 2], vec![2], vec![0, 1]])
             }
-            (Subject::Control(_), ControlParts::Components) => {
+            (TestKind::Control, ControlParts::Components) => {
                 Some(single.chain([(0..count).collect()]).collect())
             }
-            (Subject::Control(_) | Subject::Position(_) | Subject::Attitude(_), _) => Some(single.collect()),
+            (TestKind::Control | TestKind::Position | TestKind::Attitude, _) => Some(single.collect()),
             _ => None,
         }
     }

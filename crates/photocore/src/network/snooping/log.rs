@@ -1,5 +1,6 @@
 //! Log of data snooping: all exclusions and their reasons.
 
+use super::super::test_groups::TestKind;
 use super::super::trial::Excluded;
 use crate::adjustment::Status;
 
@@ -137,7 +138,7 @@ pub enum Remark {
         /// Factor from all test values.
         overall: f64,
         /// Types with their factors.
-        by_type: Vec<(usize, f64)>,
+        by_type: Vec<(TestKind, f64)>,
     },
     /// Number of points that were excluded after a robust adjustment.
     Aside(usize),
@@ -171,8 +172,8 @@ pub struct Log {
     pub before: Standing,
     /// State without the excluded ones.
     pub after: Standing,
-    /// Robust factors of the standard deviations by the type of [`super::super::Subject::kind`]; empty if the given ones are used.
-    pub factors: Vec<(usize, f64)>,
+    /// Robust factors of the standard deviations by type; empty if the given ones are used.
+    pub factors: Vec<(TestKind, f64)>,
     /// Whether each group has rows in use at the end.
     pub active: Vec<bool>,
 }

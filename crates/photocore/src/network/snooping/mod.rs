@@ -43,3 +43,4 @@ pub use consensus::Consensus;
 pub use log::{Consequence, Kept, Log, Predicted, Remark, Removal, Rival, Round, Standing};
 pub use settings::{ControlParts, Settings};
 pub use state::Snooping;
+pub use tried::{Session, Tried};

@@ -3,8 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::super::NetworkError;
-use super::super::predictions::Prediction;
-use super::log::Predicted;
+use super::log::{Predicted, Removal};
 use super::state::Snooping;
 use super::tried::Tried;
 use crate::adjustment::{log_chi_square, log_fisher};
@@ -36,16 +35,22 @@ impl Snooping {
             return Ok(vec![]);
         }
         let groups: Vec<usize> = places.iter().map(|&place| self.removals[place].group).collect();
-        let predictions = network.predictions(&groups)?.into_iter();
-        let known = places.into_iter().zip(predictions).filter_map(|(place, own)| Some((place, own?)));
-        let log_p = |(place, own): (usize, Prediction)| {
-            let log_p = self.log_probability(own.statistic, own.rows.len(), self.removals[place].group);
-            (place, (own, log_p))
+        let (predictions, starts) = (network.predictions(&groups)?, self.groups.table.starts_among(&groups));
+        // Another entry may have excluded other rows of the same group.
+        let predicted = |k: usize| {
+            let (Removal { group, rows, .. }, test) = (&self.removals[places[k]], &predictions.groups[k]);
+            let first = self.groups.rows(*group).start;
+            Predicted {
+                statistic: test.statistic,
+                log_probability: self.log_probability(test.statistic, test.rank, *group),
+                error: rows.iter().map(|row| predictions.rows[starts[k] + row - first].error).collect(),
+            }
         };
-        self.predicted = known.map(log_p).collect();
+        let known = (0..places.len()).filter(|&k| predictions.groups[k].active);
+        self.predicted = known.map(|k| (places[k], predicted(k))).collect();
         let limit = self.level.limit(0).ln();
         let mut agreeing: Vec<(f64, usize)> =
-            self.predicted.iter().map(|(&place, &(_, log_p))| (log_p, place)).collect();
+            self.predicted.iter().map(|(&place, own)| (own.log_probability, place)).collect();
         agreeing
             .retain(|&(log_p, place)| log_p >= limit && !self.returns.contains(&self.removals[place].group));
         agreeing.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
@@ -69,22 +74,9 @@ impl Snooping {
     pub(super) fn note_return(&mut self, places: &[usize], round: usize) {
         for &place in places {
             self.returns.insert(self.removals[place].group);
-            self.note_prediction(place);
+            self.removals[place].prediction = self.predicted.get(&place).cloned();
             self.removals[place].returned = Some(round);
         }
-    }
-
-    /// Records the prediction of an entry of the log. Another entry may have excluded other rows of the same group.
-    pub(super) fn note_prediction(&mut self, place: usize) {
-        let Some((own, log_probability)) = self.predicted.get(&place) else { return };
-        let first = self.groups.rows(self.removals[place].group).start;
-        let error = |row: &usize| {
-            let known = own.rows.iter().position(|k| first + k == *row);
-            known.map_or(f64::NAN, |k| own.error[k])
-        };
-        let error = self.removals[place].rows.iter().map(error).collect();
-        let (statistic, log_probability) = (own.statistic, *log_probability);
-        self.removals[place].prediction = Some(Predicted { statistic, log_probability, error });
     }
 
     /// Returns the logarithm of the p-value of an exclusion, given the network without it.

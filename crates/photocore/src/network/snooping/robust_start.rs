@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::super::NetworkError;
 use super::super::group_tests::Tests;
+use super::super::test_groups::TestKind;
 use super::choosing::Choosing;
 use super::conditional::Chosen;
 use super::log::Remark;
@@ -36,7 +37,7 @@ impl Snooping {
     fn test_values(&self, is_included: impl Fn(usize) -> bool) -> Vec<f64> {
         let value = |(group, k): (usize, usize)| {
             let redundancy = self.redundancy(group, k);
-            let w = self.tests.residual[self.groups.rows(group).start + k].abs() / redundancy.sqrt();
+            let w = self.tests.rows[self.groups.rows(group).start + k].residual.abs() / redundancy.sqrt();
             (redundancy > TESTABLE && w.is_finite()).then_some(w)
         };
         let groups = (0..self.groups.len()).filter(|&group| is_included(group));
@@ -58,8 +59,8 @@ impl Snooping {
         if count < ENOUGH || overall <= OPTIMISTIC {
             return;
         }
-        let kinds: BTreeSet<usize> = (0..self.groups.len())
-            .filter(|&group| self.tests.active[group])
+        let kinds: BTreeSet<TestKind> = (0..self.groups.len())
+            .filter(|&group| self.tests.groups[group].active)
             .map(|group| self.groups.kind(group))
             .collect();
         for kind in kinds {
@@ -112,7 +113,9 @@ impl Snooping {
         };
         let (first, standing, out) = (self.tests.clone(), self.standing, self.out.clone());
         let is_suspicious = |group: &usize| {
-            sizes[*group] > SUSPICIOUS * scale && self.groups.is_removable(*group) && first.active[*group]
+            sizes[*group] > SUSPICIOUS * scale
+                && self.groups.is_removable(*group)
+                && first.groups[*group].active
         };
         let candidates: Vec<usize> = (0..self.groups.len()).filter(is_suspicious).collect();
         let points: BTreeSet<usize> =
@@ -142,7 +145,7 @@ impl Snooping {
     ///
     /// Many gross errors increase the median of all residuals. So the factor is estimated again from robust residuals, until it is stable.
     fn robust_sizes(&self, network: &mut dyn Tried) -> Result<Option<(Vec<f64>, f64)>, NetworkError> {
-        let is_image = |group: &usize| self.tests.active[*group] && self.groups.is_image(*group);
+        let is_image = |group: &usize| self.tests.groups[*group].active && self.groups.is_image(*group);
         let images: Vec<usize> = (0..self.groups.len()).filter(is_image).collect();
         let rows =
             || images.iter().flat_map(|&group| (0..self.groups.rows(group).len()).map(move |k| (group, k)));

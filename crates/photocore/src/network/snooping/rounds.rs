@@ -1,47 +1,25 @@
 //! Rounds of data snooping: select, exclude, adjust, test again.
 
 use super::super::NetworkError;
-use super::super::trial::Trial;
 use super::consensus::Consensus;
 use super::groups::Groups;
 use super::log::{Log, Remark, Round, Standing};
 use super::settings::Settings;
 use super::state::Snooping;
-use super::tried::{Running, Tried};
-use crate::Threads;
-use crate::adjustment::{Status, Watch};
-
-impl Trial {
-    /// Excludes gross errors.
-    ///
-    /// # Errors
-    /// Errors of [`Trial::adjust`].
-    pub fn snoop(
-        &mut self,
-        settings: Settings,
-        threads: &Threads,
-        watch: Watch<'_>,
-    ) -> Result<Log, NetworkError> {
-        let mut snooping = Snooping::new(self, settings, None, threads, watch)?;
-        snooping.run(self, threads, watch)?;
-        Ok(snooping.finish())
-    }
-}
+use super::tried::{Session, Tried};
+use crate::adjustment::Status;
 
 impl Snooping {
     /// Adjusts and tests all observations, or those of a consensus if they have no adjustment together.
     ///
     /// # Errors
-    /// Errors of [`Trial::adjust`].
+    /// Errors of [`Trial::adjust`](super::super::Trial::adjust).
     pub fn new(
-        trial: &mut Trial,
+        network: &mut Session<'_>,
         settings: Settings,
         consensus: Option<&Consensus>,
-        threads: &Threads,
-        watch: Watch<'_>,
     ) -> Result<Self, NetworkError> {
-        let groups = Groups::new(trial, &settings);
-        let network = &mut Running { trial, threads, watch };
+        let groups = Groups::new(network.trial, &settings);
         let Some(consensus) = consensus else { return Self::begin(network, groups, settings, None) };
         let out = groups.excluded_by(consensus);
         let mut new = Self::begin(network, groups, settings, Some(out))?;
@@ -52,28 +30,17 @@ impl Snooping {
     /// Continues from another start: the result of a consensus, which excludes some observations.
     ///
     /// # Errors
-    /// Errors of [`Trial::adjust`].
-    pub fn restart(
-        &mut self,
-        trial: &mut Trial,
-        consensus: &Consensus,
-        threads: &Threads,
-        watch: Watch<'_>,
-    ) -> Result<(), NetworkError> {
-        self.decide(&mut Running { trial, threads, watch }, consensus, true)
+    /// Errors of [`Trial::adjust`](super::super::Trial::adjust).
+    pub fn restart(&mut self, network: &mut dyn Tried, consensus: &Consensus) -> Result<(), NetworkError> {
+        self.decide(network, consensus, true)
     }
 
     /// Returns whether the residuals are too large, before any exclusion: errors of whole sets of observations may be the reason. The global
     /// test decides; if the unit weight is unknown, whether a round would exclude any group.
     ///
     /// # Errors
-    /// Errors of [`Trial::adjust`].
-    pub fn may_have_common_errors(
-        &self,
-        trial: &mut Trial,
-        threads: &Threads,
-        watch: Watch<'_>,
-    ) -> Result<bool, NetworkError> {
+    /// Errors of [`Trial::adjust`](super::super::Trial::adjust).
+    pub fn may_have_common_errors(&self, network: &mut dyn Tried) -> Result<bool, NetworkError> {
         if !self.removals.is_empty() || self.standing.status != Status::Converged {
             return Ok(false);
         }
@@ -81,22 +48,16 @@ impl Snooping {
         if self.unit().is_rejected(1.0) == Some(true) {
             return Ok(true);
         }
-        let network = &mut Running { trial, threads, watch };
         Ok(!self.choosing(self.allowed(), 0, true).choose(network)?.is_empty())
     }
 
     /// Adjusts without the exclusions to the convergence limit of tests of sets.
     ///
     /// # Errors
-    /// Errors of [`Trial::adjust`].
-    pub fn adjust_exactly(
-        &mut self,
-        trial: &mut Trial,
-        threads: &Threads,
-        watch: Watch<'_>,
-    ) -> Result<Standing, NetworkError> {
+    /// Errors of [`Trial::adjust`](super::super::Trial::adjust).
+    pub fn adjust_exactly(&mut self, network: &mut dyn Tried) -> Result<Standing, NetworkError> {
         let (out, exact) = (self.out.clone(), self.settings.exact);
-        let adjusted = self.adjust_to(&mut Running { trial, threads, watch }, out, exact)?;
+        let adjusted = self.adjust_to(network, out, exact)?;
         adjusted.map_err(NetworkError::from)?;
         Ok(self.standing)
     }
@@ -104,17 +65,8 @@ impl Snooping {
     /// Excludes groups in rounds until nothing changes.
     ///
     /// # Errors
-    /// Errors of [`Trial::adjust`].
-    pub fn run(
-        &mut self,
-        trial: &mut Trial,
-        threads: &Threads,
-        watch: Watch<'_>,
-    ) -> Result<(), NetworkError> {
-        self.run_rounds(&mut Running { trial, threads, watch })
-    }
-
-    pub(super) fn run_rounds(&mut self, network: &mut dyn Tried) -> Result<(), NetworkError> {
+    /// Errors of [`Trial::adjust`](super::super::Trial::adjust).
+    pub fn run(&mut self, network: &mut dyn Tried) -> Result<(), NetworkError> {
         self.exclude_bad_photos(network)?;
         if self.needs_robust_start() {
             self.start_robustly(network)?;
@@ -163,10 +115,8 @@ impl Snooping {
 
     /// Returns the log with the predictions of the excluded observations.
     pub fn finish(mut self) -> Log {
-        for place in 0..self.removals.len() {
-            if self.removals[place].is_out() {
-                self.note_prediction(place);
-            }
+        for (place, entry) in self.removals.iter_mut().enumerate().filter(|own| own.1.is_out()) {
+            entry.prediction = self.predicted.remove(&place);
         }
         Log {
             removals: self.removals,
@@ -177,7 +127,7 @@ impl Snooping {
             before: self.before,
             after: self.standing,
             factors: self.factors,
-            active: self.tests.active.clone(),
+            active: self.tests.groups.iter().map(|own| own.active).collect(),
         }
     }
 }

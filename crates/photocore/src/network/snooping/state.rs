@@ -5,11 +5,11 @@ use std::sync::Arc;
 
 use super::super::NetworkError;
 use super::super::group_tests::Tests;
-use super::super::predictions::Prediction;
+use super::super::test_groups::TestKind;
 use super::super::trial::Excluded;
 use super::choosing::Choosing;
 use super::groups::Groups;
-use super::log::{Remark, Removal, Round, Standing};
+use super::log::{Predicted, Remark, Removal, Round, Standing};
 use super::settings::{ControlParts, Settings};
 use super::tried::Tried;
 use super::unit_weight::{Level, UnitWeight};
@@ -33,13 +33,13 @@ pub struct Snooping {
     pub(super) returns: HashSet<usize>,
     /// Groups that are not excluded in further rounds.
     pub(super) kept: HashSet<usize>,
-    /// Predictions of entries of the log, with the logarithms of their p-values.
-    pub(super) predicted: HashMap<usize, (Prediction, f64)>,
+    /// Predictions of entries of the log.
+    pub(super) predicted: HashMap<usize, Predicted>,
     pub(super) before: Standing,
     pub(super) standing: Standing,
     pub(super) tests: Arc<Tests>,
     pub(super) level: Level,
-    pub(super) factors: Vec<(usize, f64)>,
+    pub(super) factors: Vec<(TestKind, f64)>,
     /// Square of the factor of the standard deviations of each group.
     pub(super) scales: Vec<f64>,
 }
@@ -111,8 +111,8 @@ impl Snooping {
     pub(super) fn is_testable(&self, group: usize) -> bool {
         let components = self.groups.control == ControlParts::Components;
         let least = if components && !self.groups.is_image(group) { TESTABLE_COMPONENT } else { TESTABLE };
-        self.tests.active[group]
-            && self.tests.rank[group] > 0
+        self.tests.groups[group].active
+            && self.tests.groups[group].rank > 0
             && (0..self.groups.rows(group).len()).any(|k| self.redundancy(group, k) > least)
     }
 
@@ -120,6 +120,6 @@ impl Snooping {
     pub(super) fn redundancy(&self, group: usize, k: usize) -> f64 {
         let rows = self.groups.rows(group);
         let place = self.groups.table.block_starts()[group] + k * (rows.len() + 1);
-        if self.tests.residual[rows.start + k].is_nan() { 0.0 } else { self.tests.cofactors[place] }
+        if self.tests.rows[rows.start + k].residual.is_nan() { 0.0 } else { self.tests.cofactors[place] }
     }
 }

@@ -5,9 +5,9 @@ use std::collections::{BTreeSet, HashSet};
 use nalgebra::{DMatrix, DVector};
 
 use super::super::NetworkError;
-use super::super::group_tests::Tests;
-use super::super::predictions::{OnPoint, Prediction};
-use super::super::suspects::Subject;
+use super::super::group_tests::{TestOfGroup, TestOfRow, Tests};
+use super::super::predictions::ResidualBlock;
+use super::super::test_groups::TestKind;
 use super::super::trial::Excluded;
 use super::groups::Groups;
 use super::tried::Tried;
@@ -20,7 +20,7 @@ struct Linear {
     partials: DMatrix<f64>,
     observed: DVector<f64>,
     /// Type of the observations: images are not disputed.
-    subject: fn(usize) -> Subject,
+    kind: TestKind,
     is_in: Vec<bool>,
     values: DVector<f64>,
     cofactors: DMatrix<f64>,
@@ -32,7 +32,7 @@ impl Linear {
         Self {
             observed: DVector::from_column_slice(observed) / sd,
             partials: partials / sd,
-            subject: Subject::Image,
+            kind: TestKind::Image,
             is_in: vec![true; observed.len()],
             values: DVector::zeros(count),
             cofactors: DMatrix::zeros(count, count),
@@ -60,9 +60,9 @@ impl Linear {
     }
 
     fn snoop(&mut self, settings: Settings) -> Log {
-        let groups = Groups::of_single_rows(self.observed.len(), self.subject);
+        let groups = Groups::of_single_rows(self.observed.len(), self.kind);
         let mut snooping = Snooping::begin(self, groups, settings, None).unwrap();
-        snooping.run_rounds(self).unwrap();
+        snooping.run(self).unwrap();
         snooping.finish()
     }
 }
@@ -84,41 +84,32 @@ impl Tried for Linear {
 
     fn tests(&mut self) -> Result<Tests, NetworkError> {
         let (v, r) = (self.residuals(), self.r());
-        let test = |row: usize| self.is_in[row].then(|| GroupTest::new(&[v[row]], &[r[(row, row)]], None));
-        let all: Vec<Option<GroupTest>> = (0..v.len()).map(test).collect();
-        let of = |value: &dyn Fn(&GroupTest) -> f64| -> Vec<f64> {
-            all.iter().map(|test| test.as_ref().map_or(f64::NAN, value)).collect()
-        };
-        Ok(Tests {
-            active: self.is_in.clone(),
-            rank: all.iter().map(|test| test.as_ref().map_or(0, |test| test.rank)).collect(),
-            statistic: of(&|test| test.statistic),
-            least: of(&|test| test.least),
-            shared: vec![0.0; v.len()],
-            residual: (0..v.len()).map(|row| if self.is_in[row] { v[row] } else { f64::NAN }).collect(),
-            cofactors: r.diagonal().as_slice().to_vec(),
-            error: of(&|test| test.error[0]),
-            error_sd: of(&|test| test.cofactors[0].sqrt()),
-        })
+        let mut all = Tests::inactive(v.len(), v.len(), 0);
+        all.cofactors = r.diagonal().as_slice().to_vec();
+        for row in (0..v.len()).filter(|&row| self.is_in[row]) {
+            let test = GroupTest::new(&[v[row]], &[r[(row, row)]], None);
+            all.groups[row] = TestOfGroup { shared: 0.0, ..(&test).into() };
+            let (error, error_sd) = (test.error[0], test.cofactors[0].sqrt());
+            all.rows[row] = TestOfRow { residual: v[row], error, error_sd };
+        }
+        Ok(all)
     }
 
-    fn predictions(&mut self, groups: &[usize]) -> Result<Vec<Option<Prediction>>, NetworkError> {
+    fn predictions(&mut self, groups: &[usize]) -> Result<Tests, NetworkError> {
         let residuals = self.residuals();
-        let of = |&row: &usize| {
+        let mut all = Tests::inactive(groups.len(), groups.len(), 0);
+        for (k, &row) in groups.iter().enumerate().filter(|own| !self.is_in[*own.1]) {
             let a = self.partials.row(row);
             let variance = 1.0 + (a * &self.cofactors * a.transpose())[0];
             let statistic = residuals[row].powi(2) / variance;
-            let (error, error_sd) = (vec![residuals[row]], vec![variance.sqrt()]);
-            (!self.is_in[row]).then(|| Prediction { statistic, rows: vec![0], error, error_sd })
-        };
-        Ok(groups.iter().map(of).collect())
+            all.groups[k] = TestOfGroup { active: true, rank: 1, statistic, ..all.groups[k] };
+            let (error, error_sd) = (residuals[row], variance.sqrt());
+            all.rows[k] = TestOfRow { error, error_sd, ..all.rows[k] };
+        }
+        Ok(all)
     }
 
-    fn on_points(&mut self, _: &[usize]) -> Result<Vec<OnPoint>, NetworkError> {
-        Ok(vec![])
-    }
-
-    fn on_gone_points(&mut self, _: &[usize]) -> Result<Vec<OnPoint>, NetworkError> {
+    fn on_points(&mut self, _: &[usize], _: bool) -> Result<Vec<ResidualBlock>, NetworkError> {
         Ok(vec![])
     }
 
@@ -220,7 +211,7 @@ fn three_outliers_that_mask_each_other_are_found() {
 fn one_of_two_contradicting_observations_is_disputed() {
     // Two observations of one unknown: either explains the difference.
     let mut two = Linear::new(DMatrix::from_element(2, 1, 1.0), &[0.0, 10.0], 1.0);
-    two.subject = Subject::Observation;
+    two.kind = TestKind::Observation;
     let log = two.snoop(Settings::default());
     assert_eq!(log.removals[0].kept, Some(Kept::Disputed));
     assert_eq!(log.removals[0].rivals.len(), 1);
@@ -245,7 +236,7 @@ fn the_global_test_requires_a_known_unit_weight() {
 
 #[test]
 fn groups_of_a_linear_model_have_no_points() {
-    let groups = Groups::of_single_rows(3, Subject::Observation);
+    let groups = Groups::of_single_rows(3, TestKind::Observation);
     let out = Excluded { rows: vec![true, false, false], ..Excluded::default() };
     assert_eq!(groups.consequences(&out, 0), (None, false));
     assert_eq!(groups.affected_photos(1), BTreeSet::new());

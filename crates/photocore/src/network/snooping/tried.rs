@@ -1,7 +1,7 @@
 //! Operations of a network that data snooping requires.
 
 use super::super::group_tests::Tests;
-use super::super::predictions::{OnPoint, Prediction};
+use super::super::predictions::ResidualBlock;
 use super::super::trial::{Excluded, Trial};
 use super::super::{Combination, NetworkError, Outcome};
 use super::log::Standing;
@@ -17,16 +17,18 @@ const ROBUST_ITERATIONS: usize = 20;
 const LEAST_WEIGHT: f64 = 1e-12;
 
 /// A network that can be adjusted without some observations; see the methods of [`Trial`].
-pub(super) trait Tried {
+pub trait Tried {
+    /// Adjusts without some observations.
     fn adjust(&mut self, out: &Excluded, tolerance: f64) -> Result<Standing, NetworkError>;
 
+    /// Returns the tests of all groups.
     fn tests(&mut self) -> Result<Tests, NetworkError>;
 
-    fn predictions(&mut self, groups: &[usize]) -> Result<Vec<Option<Prediction>>, NetworkError>;
+    /// Returns tests of excluded rows against their prediction.
+    fn predictions(&mut self, groups: &[usize]) -> Result<Tests, NetworkError>;
 
-    fn on_points(&mut self, points: &[usize]) -> Result<Vec<OnPoint>, NetworkError>;
-
-    fn on_gone_points(&mut self, points: &[usize]) -> Result<Vec<OnPoint>, NetworkError>;
+    /// Returns R of points, on request of excluded ones as if they were active.
+    fn on_points(&mut self, points: &[usize], gone: bool) -> Result<Vec<ResidualBlock>, NetworkError>;
 
     /// Returns R of all rows.
     fn responses(&mut self) -> Result<Vec<f64>, NetworkError>;
@@ -37,13 +39,16 @@ pub(super) trait Tried {
 }
 
 /// A trial with its threads and progress.
-pub(super) struct Running<'a> {
+pub struct Session<'a> {
+    /// The trial.
     pub trial: &'a mut Trial,
+    /// Threads of its adjustments and tests.
     pub threads: &'a Threads,
+    /// Progress of its adjustments.
     pub watch: Watch<'a>,
 }
 
-impl Tried for Running<'_> {
+impl Tried for Session<'_> {
     fn adjust(&mut self, out: &Excluded, tolerance: f64) -> Result<Standing, NetworkError> {
         let Outcome { status, sum_of_squares, degrees_of_freedom, collapsed, .. } =
             self.trial.adjust(out, Some(tolerance), self.threads, self.watch)?;
@@ -57,20 +62,16 @@ impl Tried for Running<'_> {
         self.trial.tests(true, self.threads)
     }
 
-    fn predictions(&mut self, groups: &[usize]) -> Result<Vec<Option<Prediction>>, NetworkError> {
+    fn predictions(&mut self, groups: &[usize]) -> Result<Tests, NetworkError> {
         self.trial.predictions(groups, self.threads)
     }
 
-    fn on_points(&mut self, points: &[usize]) -> Result<Vec<OnPoint>, NetworkError> {
-        self.trial.on_points(points, self.threads)
-    }
-
-    fn on_gone_points(&mut self, points: &[usize]) -> Result<Vec<OnPoint>, NetworkError> {
-        self.trial.on_gone_points(points, self.threads)
+    fn on_points(&mut self, points: &[usize], gone: bool) -> Result<Vec<ResidualBlock>, NetworkError> {
+        self.trial.on_points(points, (0.0, gone), self.threads)
     }
 
     fn responses(&mut self) -> Result<Vec<f64>, NetworkError> {
-        let all: Vec<usize> = (0..self.trial.suspects().len()).collect();
+        let all: Vec<usize> = (0..self.trial.groups.len()).collect();
         self.trial.responses(&all, self.threads)
     }
 

@@ -150,7 +150,7 @@ impl Snooping {
         let images = self.groups.table.on_photo(photo).iter().copied();
         images
             .filter(|&group| self.groups.is_image(group) && self.is_testable(group))
-            .map(|group| (self.tests.statistic[group] / self.tests.rank[group] as f64).sqrt())
+            .map(|group| (self.tests.groups[group].statistic / self.tests.groups[group].rank as f64).sqrt())
             .collect()
     }
 
@@ -169,7 +169,7 @@ impl Snooping {
     ) -> Result<bool, NetworkError> {
         let own = self.groups.table.on_photo(photo).iter().copied();
         let poses: Vec<usize> =
-            own.filter(|&group| !self.groups.is_image(group) && self.tests.active[group]).collect();
+            own.filter(|&group| !self.groups.is_image(group) && self.tests.groups[group].active).collect();
         if poses.is_empty() {
             return Ok(false);
         }

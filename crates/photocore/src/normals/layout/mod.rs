@@ -254,6 +254,11 @@ impl Layout {
         self.tie_ptr[tie]..self.tie_ptr[tie + 1]
     }
 
+    /// Returns the tie of an equation, numbered among the equations of all ties.
+    pub fn tie_with(&self, row: usize) -> usize {
+        self.tie_ptr.partition_point(|&first| first <= row) - 1
+    }
+
     /// Returns the range of the square matrix of a tie among the matrices of all ties.
     pub fn tie_block(&self, tie: usize) -> Range<usize> {
         self.block_ptr[tie]..self.block_ptr[tie + 1]
