@@ -184,6 +184,12 @@ def repeated_pairs(first: NDArray[np.int64], second: NDArray[np.int64], count: i
     return np.setdiff1d(np.arange(len(pairs)), np.unique(pairs, return_index=True)[1])
 
 
+def rows_of_each(values: NDArray[np.integer[Any]], count: int) -> list[NDArray[np.int64]]:
+    """Return the rows of each integer below `count` in an array of values."""
+    order = np.argsort(values, kind="stable")
+    return np.split(order, np.searchsorted(values[order], np.arange(1, count)))
+
+
 def length(name: str, value: ArrayLike) -> int:
     """Return the number of rows of an array; reject a single value."""
     array = _array(name, value, "values")

@@ -10,13 +10,10 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal, get_args
+from typing import Literal, get_args
 
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.words import Phrase, phrase
-
-if TYPE_CHECKING:
-    pass
 
 How = Literal["exchange", "sign", "digit", "lost or extra"]
 

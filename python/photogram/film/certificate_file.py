@@ -175,15 +175,13 @@ def _sign(table: TomlTree, key: str) -> int:
     return int(value)
 
 
-def _angles(own: TomlTree, c: float | None) -> Floats:
+def _angles(own: TomlTree, c: float) -> Floats:
     """Return angles from the axis (rad) given in degrees or as radii in mm."""
     if ("angle" in own) == ("radius" in own):
         raise own.at("angle").error(phrase("error.exclusive", first="angle", second="radius"))
     key = "angle" if "angle" in own else "radius"
     values = _numbers(own, key)
     if key == "radius":
-        if c is None:
-            raise own["radius"].error(phrase("error.requires", name="radius", other="c"))
         values = np.degrees(np.arctan2(values, c))
     if (wrong := values[~((values > 0) & (values < 90))]).size:
         raise own[key].error(phrase("films.angles", value=float(wrong[0])))

@@ -25,6 +25,7 @@ from photogram.network.films import (
     Scanner,
     ScannerCurve,
 )
+from photogram.statistics.fits import Fit
 from photogram.words import Phrase, phrase
 
 FilmModel = Literal["conformal", "affine", "bilinear", "projective"]
@@ -178,8 +179,8 @@ def interior_orientation(
     one_of("model", model, get_args(FilmModel))
     q = shaped("places", places, (None, 2))
     xy = shaped("readings", readings, q.shape)
-    weights = 1.0 / np.broadcast_to(np.asarray(sd, dtype=float), xy.shape)
-    if not (np.isfinite(q).all() and np.isfinite(xy).all() and np.isfinite(weights).all()):
+    variances = np.broadcast_to(np.square(np.asarray(sd, dtype=float)), xy.shape)
+    if not (np.isfinite([q, xy, variances]).all() and (variances > 0).all()):
         raise InputError(phrase("films.finite-readings"))
     names = UNKNOWNS[model]
     if 2 * len(q) < len(names):
@@ -196,7 +197,7 @@ def interior_orientation(
     fit = _Fit(
         q,
         xy,
-        weights,
+        variances.ravel(),
         names,
         own,
         machine,
@@ -249,7 +250,7 @@ def side_residuals(places: Floats, true: Floats) -> tuple[float, float]:
 class _Fit:
     places: Floats
     readings: Floats
-    weights: Floats
+    variances: Floats  # (2 n,) of the readings
     names: Sequence[str]
     counted: Readings
     scanner: Scanner
@@ -273,53 +274,50 @@ class _Fit:
         )
 
     def equations(self, values: Floats) -> tuple[Floats, Floats]:
-        """Return weighted residuals (2 n,) and partials (2 n, k), with the reseau rows."""
+        """Return misfits (2 n,) and partials (2 n, k), with the rows of the reseau."""
         film = self.film(values)
         computed, partials = _photocore.film_readings(film.numbers(), _vectors(film), self.places)
         columns = [2 + _place(name) for name in self.names]
-        own = (partials[:, :, columns] * self.weights[:, :, np.newaxis]).reshape(-1, len(columns))
-        right = ((self.readings - computed) * self.weights).ravel()
+        own, misfits = partials[:, :, columns].reshape(-1, len(columns)), (self.readings - computed).ravel()
         if self.reseau is None:
-            return right, own
+            return misfits, own
         theta = values[2]
         turn = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
         by_shift = partials[:, :, 2:4] @ turn * [-1.0 if self.mirrored else 1.0, 1.0]
-        by_shift *= self.weights[:, :, np.newaxis]
-        nodes = np.einsum("nij,nk->nikj", by_shift, _parts(self.reseau, self.places)).reshape(len(right), -1)
-        root = np.linalg.inv(np.linalg.cholesky(self.reseau.covariance))
-        none = np.zeros((len(root), len(columns)))
-        return np.concatenate([right, -root @ values[8:]]), np.block([[own, nodes], [none, root]])
+        nodes = np.einsum("nij,nk->nikj", by_shift, _parts(self.reseau, self.places)).reshape(len(own), -1)
+        observed = np.eye(len(columns) + nodes.shape[1])[len(columns) :]
+        return np.concatenate([misfits, -values[8:]]), np.vstack([np.hstack([own, nodes]), observed])
 
     def adjusted(self, model: FilmModel, values: Floats) -> Interior:
         known, shifts = [_place(name) for name in self.names], list(range(8, len(values)))
         columns, size, rows = known + shifts, np.abs(self.places).max(), 2 * len(self.places)
         # Movements of a mark at the edge per unit of each unknown
         moves = np.array([1.0, 1.0, *[size] * 4, *[size**2] * 2, *np.ones(len(shifts))])[columns]
+        covariance = np.diag(np.concatenate([self.variances, np.ones(len(shifts))]))
+        if self.reseau is not None:
+            covariance[rows:, rows:] = self.reseau.covariance
         for _ in range(_MAX_STEPS):
-            right, matrix = self.equations(values)
+            misfits, matrix = self.equations(values)
             scale = np.linalg.norm(matrix, axis=0)
             if not (scale > 0).all() or np.linalg.matrix_rank(matrix / scale) < len(columns):
                 raise InputError(phrase("films.undetermined", model=model))
-            step = np.linalg.lstsq(matrix / scale, right, rcond=None)[0] / scale
-            values[columns] += step
-            if np.abs(step * moves).max() < _CONVERGED * size:
+            fit = Fit.of(misfits, covariance, matrix)
+            values[columns] += fit.parameters
+            if np.abs(fit.parameters * moves).max() < _CONVERGED * size:
                 break
         else:
             raise InputError(phrase("films.not-converged", model=model))
-        right, matrix = self.equations(values)
-        basis, triangle = np.linalg.qr(matrix)
-        inverse = np.linalg.inv(triangle)
-        cofactors = (inverse @ inverse.T)[: len(known), : len(known)]
+        cofactors = fit.cofactors[: len(known), : len(known)]
         return Interior(
             model=model,
             film=frozen(values[:6]),
             bend=frozen(values[6:8]),
             unknowns=tuple(self.names),
             cofactors=frozen(cofactors),
-            residuals=frozen(right[:rows].reshape(-1, 2) / self.weights),
-            redundancy=frozen(1.0 - (basis[:rows] ** 2).sum(axis=1).reshape(-1, 2)),
-            omega=float(right @ right),
-            degrees_of_freedom=len(right) - len(columns),
+            residuals=frozen(fit.residuals[:rows].reshape(-1, 2)),
+            redundancy=frozen(fit.redundancy[:rows].reshape(-1, 2)),
+            omega=fit.omega,
+            degrees_of_freedom=len(misfits) - len(columns),
             mirrored=self.mirrored,
             affine=self._affine(values, cofactors) if len(self.names) <= 6 else None,
             shifts=frozen(values[8:].reshape(-1, 2)),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.arrays import natural_order
+from photogram.arguments.arrays import natural_order, rows_of_each
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.giant.common import Common
@@ -104,17 +104,15 @@ def _stations(block: Block) -> tuple[tuple[Floats, Floats], list[Message]]:
 
 
 def _images(block: Block, cameras: list[str]) -> list[ImageFrame]:
-    order = np.argsort(block.image_photos, kind="stable")
-    bounds = np.searchsorted(block.image_photos[order], np.arange(len(block.photo_ids) + 1))
     frames = []
-    for photo, name in enumerate(block.photo_ids):
-        rows = order[bounds[photo] : bounds[photo + 1]]
+    images = rows_of_each(block.image_photos, len(block.photo_ids))
+    for name, camera, rows in zip(block.photo_ids, cameras, images, strict=True):
         sd = block.image_sd[rows]
         if (sd != sd[:1]).any():
             raise InputError(phrase("giant.image-sd", photo=name))
         points = [block.point_ids[point] for point in block.image_points[rows].tolist()]
         x_sd, y_sd = sd[0].tolist() if len(sd) else (0.0, 0.0)
-        frames.append(ImageFrame(name, points, block.image_xy[rows], sd=(x_sd, y_sd), camera=cameras[photo]))
+        frames.append(ImageFrame(name, points, block.image_xy[rows], sd=(x_sd, y_sd), camera=camera))
     return frames
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from photogram.arguments.arrays import rows_of_each
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.network.block import Block
@@ -23,11 +24,9 @@ def image_directions(block: Block) -> Floats:
     -z. Refraction is ignored.
     """
     cameras, photo_cameras = block.core_cameras()
-    of_images = photo_cameras[block.image_photos]
-    order = np.argsort(of_images, kind="stable")
-    ends = np.searchsorted(of_images[order], np.arange(len(cameras)), side="right")
-    directions, places = np.full((len(order), 3), np.nan), focal_images(block)
-    for row, own in zip(cameras, np.split(order, ends[:-1]), strict=True):
+    images = rows_of_each(photo_cameras[block.image_photos], len(cameras))
+    directions, places = np.full((len(block.image_photos), 3), np.nan), focal_images(block)
+    for row, own in zip(cameras, images, strict=True):
         directions[own] = rays_of_row(row, places[own])
     return directions
 

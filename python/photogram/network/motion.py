@@ -11,6 +11,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from photogram.arguments.arrays import rows_of_each
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network.block import Block, flown_by
 from photogram.network.film_reduction import camera_images
@@ -80,12 +81,9 @@ def timed_images(block: Block) -> Iterator[tuple[Timed, Trajectory, int, Indices
     if not block.timed:
         return
     rows = {name: row for row, name in enumerate(block.photo_ids)}
-    order = np.argsort(block.image_photos, kind="stable")
-    ends = np.searchsorted(block.image_photos[order], np.arange(len(rows)), side="right")
-    starts = np.append(0, ends)
+    images = rows_of_each(block.image_photos, len(rows))
     for own, trajectory in zip(block.timed, block.trajectories, strict=True):
-        row = rows[own.photo]
-        yield own, trajectory, row, order[starts[row] : ends[row]]
+        yield own, trajectory, rows[own.photo], images[rows[own.photo]]
 
 
 def about(trajectory: Trajectory, time: float) -> tuple[Floats, Floats]:

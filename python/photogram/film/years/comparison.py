@@ -37,6 +37,10 @@ ALONE = 1e-3  # Least independent part of the standard deviation of a value give
 
 _RADIAL = ((0, 1), (-2, 3), (3, -12, 10), (-4, 30, -60, 35))
 """Coefficients of rho, rho^3, ...: R_1 = rho, R_3, R_5, R_7."""
+_NAMES = (
+    *("principal distance", "shift x", "shift y", "radial 3", "radial 5", "radial 7"),
+    *("decentring x", "decentring y", "affinity", "shear"),
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +63,8 @@ def figures_of(cameras: Sequence[Camera], angle: float) -> CameraFigures:
     if len(units) > 1:
         raise InputError(phrase("films.two-units", camera=cameras[0].title))
     directions, apart = _apart(angle)
-    names, factors, of_units = _named(cameras[0].unit == "mm", angle)
+    metric, rest = cameras[0].unit == "mm", len(_NAMES) - 1
+    factors = np.array([1 / np.tan(angle), *[UM if metric else 1.0] * rest])
     values, roots = [], []
     for each in cameras:
         value, root = _with_root(each, directions, apart)
@@ -70,9 +75,9 @@ def figures_of(cameras: Sequence[Camera], angle: float) -> CameraFigures:
     return CameraFigures(
         np.array(values)[:, common],
         np.array([each[common] @ each[common].T for each in roots]),
-        tuple(np.array(names)[common].tolist()),
-        tuple(np.array(of_units)[common].tolist()),
-        tuple(np.array(names)[estimated.any(axis=0) & ~common].tolist()),
+        tuple(np.array(_NAMES)[common].tolist()),
+        tuple(np.array(["mm", *["um"] * rest] if metric else ["px"] * len(_NAMES))[common].tolist()),
+        tuple(np.array(_NAMES)[estimated.any(axis=0) & ~common].tolist()),
     )
 
 
@@ -88,15 +93,6 @@ def _estimated(root: Floats) -> Bools:
         if found[row]:
             before = np.vstack([before, left / size])
     return found
-
-
-def _named(metric: bool, angle: float) -> tuple[list[str], Floats, list[str]]:
-    """Return names, factors to the units of tables, and these units, in field order."""
-    names = ["principal distance", "shift x", "shift y", "radial 3", "radial 5", "radial 7"]
-    names += ["decentring x", "decentring y", "affinity", "shear"]
-    small = UM if metric else 1.0
-    factors = np.array([1 / np.tan(angle), *[small] * (len(names) - 1)])
-    return names, factors, ["mm", *["um"] * 9] if metric else ["px"] * 10
 
 
 def _apart(angle: float) -> tuple[Floats, Floats]:

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from photogram.arguments.arrays import rows_of_each
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
@@ -15,7 +16,7 @@ from photogram.formats.csm.cubes import read_list, read_support
 from photogram.formats.csm.photos import SupportedImage
 from photogram.formats.format import FORMATS
 from photogram.formats.isis.network import ControlNetwork, read_network
-from photogram.formats.isis.outcome import DETAILS, PITCHES, Image, PlanetaryContents, rows_of_each
+from photogram.formats.isis.outcome import DETAILS, PITCHES, Image, PlanetaryContents
 from photogram.formats.isis.solving import Settings, observation_number, one_flight, read_settings, solving
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions

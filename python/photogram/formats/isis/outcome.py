@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from photogram.arguments.arrays import rows_of_each
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError
 from photogram.formats.csm.isd import to_angles
@@ -180,12 +180,6 @@ class PlanetaryContents:
     def different(self) -> list[Image]:
         """The images, each once: a push frame camera has several photos in one image."""
         return list(dict.fromkeys(self.images.values()))
-
-
-def rows_of_each(values: NDArray[np.integer[Any]], count: int) -> list[Indices]:
-    """Return the positions of each integer below `count` in an array of values."""
-    order = np.argsort(values, kind="stable")
-    return np.split(order, np.searchsorted(values[order], np.arange(1, count)))
 
 
 def contents_of(details: Mapping[str, Any]) -> PlanetaryContents:

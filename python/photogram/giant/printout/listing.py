@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from photogram.arguments.arrays import truth_value
+from photogram.arguments.arrays import rows_of_each, truth_value
 from photogram.arguments.types import Bools
 from photogram.giant.diagnostics import error_warnings
 from photogram.giant.fields import printed_order
@@ -145,10 +145,9 @@ def _result_pages(
 
 def _residuals(block: Block, result: Result) -> Iterator[PointResiduals]:
     """Yield the points in order of the block, with images by frame."""
-    order = np.argsort(block.image_points, kind="stable")
-    bounds = np.searchsorted(block.image_points[order], np.arange(len(block.point_ids) + 1))
+    images = rows_of_each(block.image_points, len(block.point_ids))
     for point in np.flatnonzero(result.used_points).tolist():
-        rows = order[bounds[point] : bounds[point + 1]]
+        rows = images[point]
         frames = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
         yield PointResiduals(block.point_ids[point], frames, result.residuals[rows])
 
