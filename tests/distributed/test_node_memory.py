@@ -38,16 +38,16 @@ before = held()
 node = engine.node(folder, number)
 print(held() - before)
 Path("/proc/self/clear_refs").write_text("5")
-formed = node.form(node.initial, [], damping=0.0, curved=False, threads=1)
+formed = node.form(node.initial, [], damping=0.0, curved=False, threads=0)
 outer, datum = len(node.outer), None
 if columns:
     b, t = np.ones((2, columns, len(node.initial)))
-    formed.reduce(b.copy(), threads=1)
+    formed.reduce(b.copy(), threads=0)
 print(held() - before)
 if columns:
-    w = formed.complete(np.zeros(columns * outer), threads=1)
+    w = formed.complete(np.zeros(columns * outer), threads=0)
     datum = t, w, np.eye(columns), node.initial, 1.0, []
-found, _ = formed.invert(np.zeros(outer * (outer + 1) // 2), node.initial, datum=datum, threads=1)
+found, _ = formed.invert(np.zeros(outer * (outer + 1) // 2), node.initial, datum=datum, threads=0)
 engine.keep(folder, number, found, 1.0)
 print(most() - before)
 """
