@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import MutableMapping
+from collections.abc import Iterable, MutableMapping
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -94,6 +95,17 @@ def in_deviations(
         deviates[row] = math.sqrt(max(statistic, 0.0))
         sizes[row] = math.sqrt(tested + (variance or 1.0) * squares)
     return deviates, sizes, errors
+
+
+def correlate(found: Facts, rows: Iterable[int], checks: int, joint: Joint) -> None:
+    """Correlate the scores of sets that only check points test: the largest canonical correlations."""
+    flat, _, inverse = joint
+    root, bases = np.linalg.cholesky(inverse).T, {}
+    for row in rows:
+        changes = np.reshape(found["sets"][row]["at_checks"], (3 * checks, -1))[flat]
+        bases[row] = np.linalg.qr(root @ changes)[0]
+    for first, second in product(bases, repeat=2):
+        found["correlations"][first, second] = np.linalg.norm(bases[first].T @ bases[second], 2)
 
 
 def _inverse(matrix: Floats, units: Floats) -> Floats:

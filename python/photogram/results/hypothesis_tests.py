@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
 from photogram.results.hypotheses import DETECTION, SHARES, WHOLE, Effect, Hypotheses
-from photogram.results.hypothesis_checks import Joint, in_deviations, single_checks, with_checks
+from photogram.results.hypothesis_checks import Joint, correlate, in_deviations, single_checks, with_checks
 from photogram.results.network_trial import (
     IMAGE,
     NO_FACTS,
@@ -83,6 +83,7 @@ def hypotheses(
             units = own["plausible"] if of_set else trial.deviations[suspects.rows(int(groups[row]))]
             if row in effects and with_checks(found, row, own, units, checks, joint):
                 relative.add(row)
+        correlate(found, relative, checks, joint)
     variance = None if known else standing[0] / standing[1]
     deviates, sizes, errors = in_deviations(found, checks, joint, variance)
     for own in found["sets"]:
