@@ -130,6 +130,7 @@ class ToyNode:
         self._bytes["contribution_bytes"] = 8.0 * (s * (s + 1) / 2 + 2 * s)
 
     def prediction(self, threads):
+        """Return the memory, which does not depend on the threads."""
         return self._bytes
 
     def _rows(self, block):
