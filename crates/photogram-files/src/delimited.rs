@@ -3,6 +3,7 @@
 use std::hash::{BuildHasher, RandomState};
 use std::ops::Range;
 
+use hashbrown::HashTable;
 use rayon::prelude::*;
 
 /// Maximum length of a line in bytes.
@@ -250,21 +251,14 @@ pub struct Names {
     /// Distinct names, each followed by a line feed.
     pub text: Vec<u8>,
     starts: Vec<usize>,
-    /// Hash table: a power of two of slots, at most half of them filled.
-    slots: Vec<ColumnSlot>,
+    /// Indices of the names, by hash.
+    numbers: HashTable<u32>,
     hashes: RandomState,
     /// Whether names contain lower-case or upper-case letters.
     lower: bool,
     upper: bool,
     /// Whether a name is empty, "nan", not ASCII, or contains a blank.
     doubtful: bool,
-}
-
-#[derive(Debug, Clone, Copy)]
-struct ColumnSlot {
-    hash: u32,
-    /// Index of a name, from 1; 0 for a free slot.
-    number: u32,
 }
 
 impl Names {
@@ -284,50 +278,18 @@ impl Names {
     }
 
     fn number(&mut self, name: &[u8], hash: u64) -> Option<i64> {
-        if 2 * self.starts.len() >= self.slots.len() {
-            self.grow();
+        let found = self.numbers.find(hash, |&number| name_at(&self.text, &self.starts, number) == name);
+        if let Some(&number) = found {
+            return Some(i64::from(number));
         }
-        let slot = self.slot(name, hash);
-        if self.slots[slot].number == 0 {
-            self.check(name)?;
-            self.starts.push(self.text.len());
-            self.text.extend_from_slice(name);
-            self.text.push(b'\n');
-            self.slots[slot] =
-                ColumnSlot { hash: (hash >> 32) as u32, number: u32::try_from(self.starts.len()).ok()? };
-        }
-        Some(i64::from(self.slots[slot].number) - 1)
-    }
-
-    /// Returns the slot of a name, or a free slot.
-    fn slot(&self, name: &[u8], hash: u64) -> usize {
-        let last = self.slots.len() - 1;
-        let mut at = hash as usize & last;
-        loop {
-            let slot = self.slots[at];
-            if slot.number == 0 || (slot.hash == (hash >> 32) as u32 && self.is_name(slot.number, name)) {
-                return at;
-            }
-            at = (at + 1) & last;
-        }
-    }
-
-    fn is_name(&self, number: u32, name: &[u8]) -> bool {
-        let text = &self.text[self.starts[number as usize - 1]..];
-        text.get(name.len()) == Some(&b'\n') && text.starts_with(name)
-    }
-
-    fn grow(&mut self) {
-        let count = (2 * self.slots.len()).max(64);
-        self.slots = vec![ColumnSlot { hash: 0, number: 0 }; count];
-        for (number, name) in (1..).zip(self.text.split(|&byte| byte == b'\n').take(self.starts.len())) {
-            let hash = self.hashes.hash_one(name);
-            let mut at = hash as usize & (count - 1);
-            while self.slots[at].number > 0 {
-                at = (at + 1) & (count - 1);
-            }
-            self.slots[at] = ColumnSlot { hash: (hash >> 32) as u32, number };
-        }
+        self.check(name)?;
+        let number = u32::try_from(self.starts.len()).ok()?;
+        self.starts.push(self.text.len());
+        self.text.extend_from_slice(name);
+        self.text.push(b'\n');
+        let (text, starts, hashes) = (&self.text, &self.starts, &self.hashes);
+        self.numbers.insert_unique(hash, number, |&other| hashes.hash_one(name_at(text, starts, other)));
+        Some(i64::from(number))
     }
 
     /// Records the character classes of a new name; `None` for a control character.
@@ -344,6 +306,12 @@ impl Names {
         }
         Some(())
     }
+}
+
+/// Returns the name with an index, without its line feed.
+fn name_at<'a>(text: &'a [u8], starts: &[usize], number: u32) -> &'a [u8] {
+    let next = starts.get(number as usize + 1).copied().unwrap_or(text.len());
+    &text[starts[number as usize]..next - 1]
 }
 
 #[cfg(test)]
