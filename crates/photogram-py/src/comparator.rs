@@ -68,13 +68,8 @@ pub fn adjust_comparator(
             .map(|i| Measurement { case: case_of[i], point: point_of[i], xy: xy[i], sd: sd[i] })
             .collect(),
     };
-    let options = Options {
-        method: Method::Damped(Stop::Fraction(limit)),
-        max_iterations,
-        covariance: true,
-        loss: None,
-        threads: 0,
-    };
+    let options =
+        Options { method: Method::Damped(Stop::Fraction(limit)), max_iterations, ..Options::default() };
     let workers = Workers::of(0, calibration.measurements.len());
     let solution = watched(py, workers, None, |pool, watch| calibration.adjust_on(&options, pool, watch))?;
     told(py, solution.map_err(|error| failure(&error))?)

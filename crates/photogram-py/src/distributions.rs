@@ -1,6 +1,6 @@
 //! Distributions of test statistics; the documentation is in `_photocore.pyi`.
 
-use crate::arrays::{self, Array, Vector};
+use crate::arrays::{Array, Vector, check_lengths, numbers};
 use numpy::PyArray1;
 use photocore::adjustment::{self, Tail};
 use pyo3::prelude::*;
@@ -42,32 +42,24 @@ pub fn chi_square_quantile(probability: f64, dof: f64, upper: bool) -> f64 {
     adjustment::chi_square_quantile(probability, dof, tail(upper))
 }
 
-#[pyfunction]
-pub fn normal<'py>(py: Python<'py>, z: Array<'py>) -> PyResult<Vector<'py>> {
-    let z = arrays::numbers("z", &z)?;
-    Ok(PyArray1::from_vec(py, py.detach(|| z.iter().map(|&z| adjustment::normal(z)).collect())))
+/// Exports functions of arrays of equal length from the core.
+macro_rules! array_functions {
+    ($($name:ident($first:ident $(, $other:ident)*);)*) => {
+        $(#[pyfunction]
+        pub fn $name<'py>(
+            py: Python<'py>, $first: Array<'py>, $($other: Array<'py>),*
+        ) -> PyResult<Vector<'py>> {
+            let $first = numbers(stringify!($first), &$first)?;
+            $(let $other = numbers(stringify!($other), &$other)?;)*
+            check_lengths((stringify!($first), $first.len()), &[$((stringify!($other), $other.len())),*])?;
+            let value = |k: usize| adjustment::$name($first[k] $(, $other[k])*);
+            Ok(PyArray1::from_vec(py, py.detach(|| (0..$first.len()).map(value).collect())))
+        })*
+    };
 }
 
-#[pyfunction]
-pub fn log_chi_square<'py>(py: Python<'py>, x: Array<'py>, dof: Array<'py>) -> PyResult<Vector<'py>> {
-    let (x, dof) = (arrays::numbers("x", &x)?, arrays::numbers("dof", &dof)?);
-    let found =
-        py.detach(|| x.iter().zip(&dof).map(|(&x, &dof)| adjustment::log_chi_square(x, dof)).collect());
-    Ok(PyArray1::from_vec(py, found))
-}
-
-#[pyfunction]
-pub fn log_fisher<'py>(
-    py: Python<'py>,
-    x: Array<'py>,
-    first: Array<'py>,
-    second: Array<'py>,
-) -> PyResult<Vector<'py>> {
-    let (x, first, second) =
-        (arrays::numbers("x", &x)?, arrays::numbers("first", &first)?, arrays::numbers("second", &second)?);
-    let found = py.detach(|| {
-        let dof = first.iter().zip(&second);
-        x.iter().zip(dof).map(|(&x, (&first, &second))| adjustment::log_fisher(x, first, second)).collect()
-    });
-    Ok(PyArray1::from_vec(py, found))
+array_functions! {
+    normal(z);
+    log_chi_square(x, dof);
+    log_fisher(x, first, second);
 }

@@ -74,9 +74,7 @@ fn adjust(
     let engine = adjustment::Options {
         method: adjustment::Method::Damped(Stop::Fraction(options.tolerance)),
         max_iterations: if cycles.is_some() { 0 } else { options.max_iterations },
-        covariance: true,
-        loss: None,
-        threads: 0,
+        ..Default::default()
     };
     let mut adjusted =
         adjustment::adjust(&problem, &engine, threads, watch).map_err(|error| match error {
