@@ -70,15 +70,14 @@ def least_margin(result: Result) -> float:
 
 
 def touched(survey: Survey, wrong: Survey) -> list[int]:
-    """Return the points whose own observations have the mistake, if these are one or two."""
-    rows = [int(row) for row in survey.control[(survey.coordinates != wrong.coordinates).any(axis=1)]]
+    """Return control points with the mistake, and points whose images have it if these are one or two."""
+    control = [int(row) for row in survey.control[(survey.coordinates != wrong.coordinates).any(axis=1)]]
     images = [
         set(zip(own.photos.tolist(), own.seen.tolist(), *own.xy.T.tolist(), strict=True))
         for own in (survey, wrong)
     ]
-    rows += [point for _, point, _, _ in images[0] ^ images[1]]
-    points = {row for row in rows if row < len(survey.points)}
-    return sorted(points) if len(points) <= 2 else []
+    points = {int(point) for _, point, _, _ in images[0] ^ images[1] if point < len(survey.points)}
+    return [*control, *(points if len(points) <= 2 else [])]
 
 
 def moved(clean: Result, wrong: Result, own: list[int]) -> float:

@@ -126,7 +126,7 @@ impl<'a> Sample<'a> {
         found
     }
 
-    /// The effect of one of these errors; `own` are points that it belongs to.
+    /// The effect of one of these errors; `own` are the points that it belongs to, ascending.
     pub fn effect(&self, changes: &Changes, error: usize, own: &[usize]) -> Effect {
         let limit = self.facts.limit;
         let model = &self.trial.assembled.problem.model;
@@ -163,7 +163,7 @@ impl<'a> Sample<'a> {
             if largest > limit {
                 points += if index < self.counted { self.share } else { 1.0 };
             }
-            if !own.contains(&point) {
+            if own.binary_search(&point).is_err() {
                 // The second largest one.
                 effect.others = effect.others.max(largest.min(most));
                 most = most.max(largest);

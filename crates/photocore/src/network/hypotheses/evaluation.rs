@@ -113,9 +113,14 @@ impl Trial {
             }
         }
         let changes = sample.changes(&catalogue, &sums.effects, &errors, threads);
+        let control: Vec<usize> = catalogue.control_points(self).into_iter().map(|own| own.0).collect();
         let effect = |error: usize| {
-            let single = error.checked_sub(sets).map(|k| &singles[worst[k]]);
-            let own = single.map_or(vec![], |single| self.points_of(single.group));
+            let mut own = match error.checked_sub(sets) {
+                Some(k) => self.points_of(singles[worst[k]].group),
+                None if all[error].code.starts_with("control") => control.clone(),
+                None => vec![],
+            };
+            own.sort_unstable();
             sample.effect(&changes, error, &own)
         };
         let effects = threads.install(|| parallel::map(errors.len(), 1, effect));
