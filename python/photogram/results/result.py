@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from photogram.results.calibration import Calibration
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.parts import Terms
+    from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
@@ -165,6 +166,13 @@ class Result(OnFilm, AdjustedNetwork):
         from photogram.results.document import block_document
 
         return block_document(self)
+
+    @cached_property
+    def reliability_summary(self) -> ReliabilitySummary | None:
+        """The reliability summary of reports; see `AdjustedNetwork`."""
+        from photogram.results.evaluation import reliability_summary
+
+        return reliability_summary(self)
 
     def _findings(self) -> Findings:
         from photogram.results.findings import block_findings
@@ -311,7 +319,9 @@ class Result(OnFilm, AdjustedNetwork):
         )
 
     def _table(self, what: str) -> pd.DataFrame:
-        table = super()._table(what)
+        from photogram.results.tables import table_frame
+
+        table = table_frame(self, what)
         table.attrs["datum"] = str(self.datum)
         return table
 
