@@ -117,7 +117,10 @@ impl Trial {
         let effect = |error: usize| {
             let mut own = match error.checked_sub(sets) {
                 Some(k) => self.points_of(singles[worst[k]].group),
-                None if all[error].code.starts_with("control") => control.clone(),
+                // The scale is that of control and positions.
+                None if all[error].code.starts_with("control") || all[error].code == "scale" => {
+                    control.clone()
+                }
                 None => vec![],
             };
             own.sort_unstable();
