@@ -334,6 +334,23 @@ def test_the_limit_of_undetected_errors_decides_the_verdict():
             result.with_max_bias_ratio(wrong)
 
 
+def test_an_accepted_error_is_reported_if_its_estimate_moves_points():
+    """The error of all control heights is 2.5 standard deviations, which no test rejects."""
+    block, limit = block_of("clean"), 3.0
+    clean = adjust(block).with_max_bias_ratio(limit)
+    assert clean.verdict.code == "accepted"
+    errors = clean._hypotheses()
+    row = errors.code.tolist().index("control-heights")
+    assert errors.effects[row].ratio > limit  # of the MDB, but its estimate is small
+    error = 2.5 * np.sqrt(errors.sets[row]["cofactors"][0]) - errors.estimate[row, 0]
+    positions = block.point_positions.copy()
+    positions[(block.point_sd > 0).any(axis=1), 2] += error
+    found = adjust(block.replace(point_positions=positions)).with_max_bias_ratio(limit)
+    assert found._hypotheses().deviates[row] == pytest.approx(2.5, abs=0.02)
+    assert found.verdict.code == "accepted-not-checked"
+    assert "control-shift" in {found._hypotheses().code[harmful] for harmful in found._hypotheses().harmful}
+
+
 def test_special_cases_of_an_undetected_error_are_counted():
     """A shift of all control includes an error of all heights."""
     result = adjust(block_of("clean")).with_max_bias_ratio(0.1)
