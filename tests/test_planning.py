@@ -414,7 +414,7 @@ def test_the_document_of_three_networks_and_of_one():
 def test_a_plan_names_errors_that_would_remain_undetected():
     patterns = {
         "positions": network(control="none", position_sd=0.05),
-        "both": network(position_sd=0.05, control_spacing=1),
+        "both": network(position_sd=0.5, control_spacing=1),
     }
     made = plan(patterns)
     positions, both = made.patterns
@@ -423,7 +423,7 @@ def test_a_plan_names_errors_that_would_remain_undetected():
         codes[sentence.fields["pattern"]].add(sentence.code)
     # A time offset moves all stations along the strips like a shift of the network.
     assert {"plan.undetected.strips", "plan.assumed"} <= codes["positions"]
-    # A shift or rotation of all control within the accuracy of the positions would move all points.
+    # A shift or rotation of all control within the accuracy of the positions would move other points.
     assert codes["both"] == {"plan.unchecked", "plan.control", "plan.undetected.points"}
     (time,) = np.flatnonzero(positions.hypotheses.code == "time-offset")
     assert np.isnan(positions.hypotheses.mdb[time]).all()
