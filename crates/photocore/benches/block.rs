@@ -117,11 +117,12 @@ fn with_shared_camera(block: &Network) -> Network {
 /// Precomputed observation equations of a block, so that the phases of the normal equations are timed without the model.
 struct Linear {
     projections: Vec<geometry::Projection>,
+    prior: Prior,
 }
 
 impl Linear {
     /// Linearizes at the initial positions and attitudes of the block and the true positions of its points.
-    fn new(block: &Network) -> Self {
+    fn new(block: &Network, prior: Prior) -> Self {
         let photos: Vec<geometry::View> = block
             .photos
             .iter()
@@ -134,7 +135,7 @@ impl Linear {
             let point = geometry::Point::new(block.space, block.points[image.point].coordinates);
             photos[image.photo].linearize(&point)
         };
-        Self { projections: block.images.iter().map(linearize).collect() }
+        Self { projections: block.images.iter().map(linearize).collect(), prior }
     }
 }
 
@@ -151,6 +152,10 @@ impl Equations for Linear {
             }
         }
     }
+
+    fn prior(&self) -> &Prior {
+        &self.prior
+    }
 }
 
 /// Normal equations of a block.
@@ -158,7 +163,6 @@ struct Phases {
     threads: Threads,
     system: System,
     equations: Linear,
-    prior: Prior,
 }
 
 impl Phases {
@@ -176,23 +180,12 @@ impl Phases {
             *weight = point.sd.map(|sd| (sd * sd).recip());
         }
         let prior = Prior { right: vec![0.0; weight.len()], weight, between: vec![] };
-        let equations = Linear::new(block);
-        Self {
-            threads: threads(),
-            system: System::new(layout, Ordering::Auto).expect("a system"),
-            equations,
-            prior,
-        }
+        let equations = Linear::new(block, prior);
+        Self { threads: threads(), system: System::new(layout, Ordering::Auto).expect("a system"), equations }
     }
 
     fn factor(&self) -> Factor {
-        done(self.system.factor(
-            &self.threads,
-            &self.equations,
-            &self.prior,
-            &FactorOptions::default(),
-            &mut go,
-        ))
+        done(self.system.factor(&self.threads, &self.equations, &FactorOptions::default(), &mut go))
     }
 
     /// Returns the multiply-adds of the formation with its reduction, and of the cofactors, from the numbers of rays of the points. In
@@ -270,7 +263,9 @@ fn adjust(criterion: &mut Criterion) {
         bencher.iter(|| black_box(adjust(&shared)));
     });
     group.throughput(Throughput::Elements(block.images.len() as u64));
-    group.bench_function("linearize", |bencher| bencher.iter(|| black_box(Linear::new(&block))));
+    group.bench_function("linearize", |bencher| {
+        bencher.iter(|| black_box(Linear::new(&block, Prior::default())))
+    });
     group.finish();
 }
 
@@ -278,7 +273,7 @@ fn adjust(criterion: &mut Criterion) {
 fn phases(criterion: &mut Criterion) {
     let (block, size) = block();
     let phases = Phases::new(&block);
-    let Phases { threads, system, equations, prior } = &phases;
+    let Phases { threads, system, equations } = &phases;
     let predicted = system.symbolic().operations(system.layout());
     let (formation, cofactors) = phases.operations();
     let mut group = criterion.benchmark_group(format!("normals/{size}"));
@@ -292,9 +287,7 @@ fn phases(criterion: &mut Criterion) {
     });
     let factor = phases.factor();
     group.bench_function("solve", |bencher| {
-        bencher.iter(|| {
-            done(system.solve(threads, &factor, equations, prior, &SolveOptions::default(), &mut go))
-        });
+        bencher.iter(|| done(system.solve(threads, &factor, equations, &SolveOptions::default(), &mut go)));
     });
     // Formation, reduction and factorization are interleaved, front by front, as are selected inverse and cofactors.
     group.throughput(elements(formation + predicted.factor));
@@ -302,7 +295,7 @@ fn phases(criterion: &mut Criterion) {
     group.throughput(elements(predicted.inverse + cofactors));
     group.bench_function("invert", |bencher| {
         let invert = |factor: Factor| {
-            done(system.invert(threads, factor, equations, prior, &InvertOptions::default(), &mut go))
+            done(system.invert(threads, factor, equations, &InvertOptions::default(), &mut go))
         };
         bencher.iter_batched(|| phases.factor(), invert, BatchSize::PerIteration);
     });

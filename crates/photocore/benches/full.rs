@@ -20,7 +20,7 @@ const DIM: usize = 9;
 const POINTS: usize = 5;
 
 /// Arbitrary equations.
-struct Anything;
+struct Anything(Prior);
 
 impl Equations for Anything {
     fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
@@ -29,24 +29,28 @@ impl Equations for Anything {
         rows.local.iter_mut().enumerate().for_each(|(k, v)| *v = value(3 * k + 1));
         rows.retained.iter_mut().enumerate().for_each(|(k, v)| *v = value(7 * k + 2));
     }
+
+    fn prior(&self) -> &Prior {
+        &self.0
+    }
 }
 
-fn system(photos: usize) -> (System, Prior) {
+fn system(photos: usize) -> (System, Anything) {
     let retained = (0..POINTS * photos).map(|group| (group % photos) as u32).collect();
     let pointers = (0..=POINTS).map(|point| point * photos).collect();
     let layout = Layout::new(2, 3, &vec![DIM; photos], pointers, retained).expect("a layout");
     let unknowns = layout.unknowns();
     (
         System::new(layout, Ordering::Auto).expect("a system"),
-        Prior { weight: vec![100.0; unknowns], right: vec![0.0; unknowns], between: vec![] },
+        Anything(Prior { weight: vec![100.0; unknowns], right: vec![0.0; unknowns], between: vec![] }),
     )
 }
 
 /// Returns the time of the factorization without the formation.
-fn factor(threads: &Threads, system: &System, prior: &Prior) -> Duration {
+fn factor(threads: &Threads, system: &System, equations: &Anything) -> Duration {
     let start = Instant::now();
-    let done = system
-        .factor(threads, &Anything, prior, &FactorOptions::default(), &mut |_| ControlFlow::Continue(()));
+    let done =
+        system.factor(threads, equations, &FactorOptions::default(), &mut |_| ControlFlow::Continue(()));
     let elapsed = start.elapsed();
     match done {
         Ok(factor) => elapsed.mul_f64(1.0 - factor.formation_share),
@@ -70,9 +74,9 @@ fn full(criterion: &mut Criterion) {
     for photos in [160, 500] {
         let dim = DIM * photos;
         let mut group = criterion.benchmark_group(format!("full/{dim}"));
-        let (system, prior) = system(photos);
+        let (system, equations) = system(photos);
         group.bench_function("factor", |bencher| {
-            bencher.iter_custom(|times| (0..times).map(|_| factor(&threads, &system, &prior)).sum());
+            bencher.iter_custom(|times| (0..times).map(|_| factor(&threads, &system, &equations)).sum());
         });
         let matrix =
             Mat::from_fn(dim, dim, |i, j| if i == j { 10.0 * dim as f64 } else { ((i + j) as f64).sin() });

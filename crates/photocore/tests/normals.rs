@@ -11,7 +11,7 @@ use faer::linalg::solvers::Solve;
 use photocore::Threads;
 use photocore::normals::{
     Chord, Equations, Factor, FactorOptions, Function, GroupRows, InvertOptions, Layout, LayoutError,
-    Ordering, Prior, SelectedInverse, SolveOptions, System, SystemError, Tie, TieRows,
+    Ordering, Prior, SelectedInverse, SolveOptions, System, SystemError, Tie,
 };
 use proptest::prelude::*;
 
@@ -45,15 +45,18 @@ impl Equations for Dense {
         }
     }
 
-    fn write_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
-        let first = self.layout.groups() * self.layout.rows();
+    fn write_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
         let columns: Vec<usize> = self.layout.tie_columns(tie).collect();
-        for (k, row) in self.layout.tie_rows(tie).enumerate() {
-            rows.constant[k] = self.right[first + row];
-            for (value, &column) in rows.coefficients[k * columns.len()..].iter_mut().zip(&columns) {
-                *value = self.matrix[(first + row, column)];
+        for (k, row) in self.layout.equations_of_tie(tie).enumerate() {
+            rows.constant[k] = self.right[row];
+            for (value, &column) in rows.of_tie()[k * columns.len()..].iter_mut().zip(&columns) {
+                *value = self.matrix[(row, column)];
             }
         }
+    }
+
+    fn prior(&self) -> &Prior {
+        &self.prior
     }
 }
 
@@ -72,10 +75,10 @@ impl Dense {
 
     /// Returns the equations of the ties of a local block as functions.
     fn ties_of(&self, local: usize) -> Vec<Vec<(usize, f64)>> {
-        let (layout, first) = (&self.layout, self.layout.groups() * self.layout.rows());
+        let layout = &self.layout;
         let of_tie = |&tie: &u32| {
             let columns: Vec<usize> = layout.tie_columns(tie as usize).collect();
-            layout.tie_rows(tie as usize).map(move |row| self.row_of(first + row, &columns))
+            layout.equations_of_tie(tie as usize).map(move |row| self.row_of(row, &columns))
         };
         layout.ties_of(local).iter().flat_map(of_tie).collect()
     }
@@ -107,9 +110,9 @@ impl Dense {
             }
         }
         for tie in 0..layout.ties().len() {
-            for row in layout.tie_rows(tie) {
+            for row in layout.equations_of_tie(tie) {
                 for column in layout.tie_columns(tie) {
-                    matrix[(layout.groups() * layout.rows() + row, column)] = number();
+                    matrix[(row, column)] = number();
                 }
             }
         }
@@ -263,15 +266,13 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let threads = threads(2);
     let system = System::new(dense.layout.clone(), ordering).unwrap();
     let layout = system.layout();
-    let factor = done(system.factor(&threads, dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads, dense, &FactorOptions::default(), &mut go));
     assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
-    let solution =
-        done(system.solve(&threads, &factor, dense, &dense.prior, &SolveOptions::default(), &mut go));
+    let solution = done(system.solve(&threads, &factor, dense, &SolveOptions::default(), &mut go));
     let rights = vec![1.0; 11 * layout.unknowns()];
-    let alone = done(system.factor(&threads, dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
-    let written =
-        done(system.solve(&threads, &alone, dense, &dense.prior, &SolveOptions::default(), &mut go));
-    let further = done(system.solve(&threads, &alone, dense, &dense.prior, &solved_for(&rights), &mut go));
+    let alone = done(system.factor(&threads, dense, &FactorOptions::UNCACHED, &mut go));
+    let written = done(system.solve(&threads, &alone, dense, &SolveOptions::default(), &mut go));
+    let further = done(system.solve(&threads, &alone, dense, &solved_for(&rights), &mut go));
     let cholesky = dense.normal_matrix().llt(faer::Side::Lower).unwrap();
     let ones = cholesky.solve(Mat::<f64>::full(layout.unknowns(), 1, 1.0));
     for (i, value) in further.iter().enumerate() {
@@ -285,13 +286,12 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
         assert_close(written[i], *value, 1e-12 * expected.norm_max(), "solution from the equations");
     }
     let right: Vec<f64> = dense.normal_right().col(0).iter().copied().collect();
-    let again = done(system.solve(&threads, &factor, dense, &dense.prior, &solved_for(&right), &mut go));
+    let again = done(system.solve(&threads, &factor, dense, &solved_for(&right), &mut go));
     for (value, other) in again.iter().zip(&solution) {
         assert_close(*value, *other, 1e-11 * expected.norm_max(), "solution for its right-hand side");
     }
     if factor.has_cached() {
-        let Chord { step: chord, decrease, .. } =
-            done(system.chord(&threads, &factor, (dense, &dense.prior), &mut go));
+        let Chord { step: chord, decrease, .. } = done(system.chord(&threads, &factor, dense, &mut go));
         assert_close(decrease, factor.decrease, 1e-11 * factor.decrease, "decrease");
         for (value, other) in chord.iter().zip(&solution) {
             assert_close(*value, *other, 1e-11 * expected.norm_max(), "chord from the same values");
@@ -301,8 +301,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let inverse = cholesky.solve(Mat::<f64>::identity(layout.unknowns(), layout.unknowns()));
     compare_columns(dense, &system, &factor, &inverse);
     compare_functions(dense, &system, &factor, &inverse);
-    let found =
-        done(system.invert(&threads, factor, dense, &dense.prior, &InvertOptions::default(), &mut go));
+    let found = done(system.invert(&threads, factor, dense, &InvertOptions::default(), &mut go));
     let (cofactors, selected) = (found.cofactors, found.selected);
     compare_blocks(layout, &selected, &inverse);
     let l = layout.local_dim();
@@ -328,7 +327,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
 /// from the right-hand side; the rest uses the old factor.
 fn compare_chord(dense: &Dense, system: &System, factor: &Factor) {
     let there = Dense::new(dense.layout.clone(), 97);
-    let chord = done(system.chord(&threads(2), factor, (&there, &there.prior), &mut go)).step;
+    let chord = done(system.chord(&threads(2), factor, &there, &mut go)).step;
     let count = dense.layout.locals() * dense.layout.local_dim();
     let (before, after, right) = (dense.normal_matrix(), there.normal_matrix(), there.normal_right());
     let (right, others) = right.split_at_row(count);
@@ -358,7 +357,7 @@ fn compare_equation_blocks(dense: &Dense, system: &System, selected: &SelectedIn
         let (first, count) = (groups.start * layout.rows(), groups.len() * layout.rows());
         let (rows, ties) = (dense.rows_of(local), dense.ties_of(local));
         let formed = [rows.clone(), ties].concat();
-        let found = done(system.local_cofactors(selected, (&formed, &dense.prior), &rows, local));
+        let found = done(system.local_cofactors(selected, (&formed, &dense.prior.weight), &rows, local));
         assert_eq!(found.rows(), count);
         let group = |row: usize| row / layout.rows();
         for (k, value) in found.equations.iter().enumerate() {
@@ -391,7 +390,7 @@ fn compare_columns(dense: &Dense, system: &System, factor: &Factor, inverse: &Ma
         rights[columns.len() * unknowns + column] = 1.0;
     }
     let threads = threads(2);
-    let solved = done(system.solve(&threads, factor, dense, &dense.prior, &solved_for(&rights), &mut go));
+    let solved = done(system.solve(&threads, factor, dense, &solved_for(&rights), &mut go));
     let largest = inverse.norm_max();
     for i in 0..unknowns {
         let mut sum = 0.0;
@@ -423,8 +422,7 @@ fn compare_functions(dense: &Dense, system: &System, factor: &Factor, inverse: &
         (&several, Some(&few)),
         (&several, Some(&vec![])),
     ] {
-        let reduced =
-            done(system.reduce(&threads, dense, &dense.prior, rows, columns.map(Vec::as_slice), &mut go));
+        let reduced = done(system.reduce(&threads, dense, rows, columns.map(Vec::as_slice), &mut go));
         assert!(system.memory_of(&reduced) >= 8 * rows.len() * columns.map_or(rows.len(), Vec::len));
         let found = done(system.cofactors_of(&threads, factor, &reduced, &mut go));
         let others = columns.unwrap_or(rows);
@@ -573,9 +571,9 @@ fn groups_of_held_local_blocks_stand_apart() {
 fn equations_of_a_held_local_block_are_functions() {
     let dense = target(12, 30, 20);
     let (threads, system) = (threads(2), System::new(dense.layout.clone(), Ordering::Auto).unwrap());
-    let factor = done(system.factor(&threads, &dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads, &dense, &FactorOptions::default(), &mut go));
     let functions = dense.rows_of(7);
-    let reduced = done(system.reduce(&threads, &dense, &dense.prior, &functions, None, &mut go));
+    let reduced = done(system.reduce(&threads, &dense, &functions, None, &mut go));
     let found = done(system.cofactors_of(&threads, &factor, &reduced, &mut go));
     let count = dense.layout.unknowns();
     let inverse =
@@ -620,7 +618,7 @@ fn what_a_shared_camera_and_photos_leave_open_is_named() {
         dense.matrix[(row, own)] = dense.matrix[(row, photo)];
     }
     let system = System::new(layout, Ordering::Auto).unwrap();
-    let factor = done(system.factor(&threads(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads(2), &dense, &FactorOptions::default(), &mut go));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.blocks(), vec![vec![5, camera]]);
     assert_eq!(deficiency.unknowns(system.layout()), vec![vec![photo, own]]);
@@ -643,20 +641,17 @@ fn same_bits_of(dense: &Dense) {
     let run = |count: usize| {
         let threads = threads(count);
         let system = System::new(dense.layout.clone(), Ordering::Auto).unwrap();
-        let factor = done(system.factor(&threads, dense, &dense.prior, &FactorOptions::default(), &mut go));
-        let solution =
-            done(system.solve(&threads, &factor, dense, &dense.prior, &SolveOptions::default(), &mut go));
-        let more = done(system.solve(&threads, &factor, dense, &dense.prior, &solved_for(&rights), &mut go));
-        let alone = done(system.factor(&threads, dense, &dense.prior, &FactorOptions::UNCACHED, &mut go));
-        let written =
-            done(system.solve(&threads, &alone, dense, &dense.prior, &solved_for(&rights), &mut go));
+        let factor = done(system.factor(&threads, dense, &FactorOptions::default(), &mut go));
+        let solution = done(system.solve(&threads, &factor, dense, &SolveOptions::default(), &mut go));
+        let more = done(system.solve(&threads, &factor, dense, &solved_for(&rights), &mut go));
+        let alone = done(system.factor(&threads, dense, &FactorOptions::UNCACHED, &mut go));
+        let written = done(system.solve(&threads, &alone, dense, &solved_for(&rights), &mut go));
         let functions: Vec<Function> =
             (0..dense.layout.unknowns()).step_by(3).map(|unknown| vec![(unknown, 1.0)]).collect();
-        let reduced = done(system.reduce(&threads, dense, &dense.prior, &functions, None, &mut go));
+        let reduced = done(system.reduce(&threads, dense, &functions, None, &mut go));
         let of_functions = done(system.cofactors_of(&threads, &factor, &reduced, &mut go));
         let cofactors =
-            done(system.invert(&threads, factor, dense, &dense.prior, &InvertOptions::default(), &mut go))
-                .cofactors;
+            done(system.invert(&threads, factor, dense, &InvertOptions::default(), &mut go)).cofactors;
         let numbers =
             [solution, more, written, of_functions, cofactors.local, cofactors.retained, cofactors.equations];
         numbers.concat().into_iter().map(f64::to_bits).collect::<Vec<u64>>()
@@ -677,13 +672,13 @@ fn what_the_equations_do_not_determine_is_named() {
         dense.matrix[(row, range.start + 4)] = dense.matrix[(row, range.start + 1)];
     }
     let system = System::new(layout, Ordering::ReverseCuthillMckee).unwrap();
-    let factor = done(system.factor(&threads(2), &dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads(2), &dense, &FactorOptions::default(), &mut go));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.blocks(), vec![vec![3]]);
 }
 
 /// Differences of consecutive unknowns in chains of [`Chains::LENGTH`].
-struct Chains;
+struct Chains(Prior);
 
 impl Chains {
     const LENGTH: usize = 30;
@@ -692,10 +687,14 @@ impl Chains {
 impl Equations for Chains {
     fn write(&self, _: usize, _: usize, _: &mut GroupRows<'_>) {}
 
-    fn write_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+    fn write_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
         let weight = if tie.is_multiple_of(3) { 10.0 } else { 1.0 };
         rows.constant[0] = 0.0;
-        rows.coefficients.copy_from_slice(&[-weight, weight]);
+        rows.shared.copy_from_slice(&[-weight, weight]);
+    }
+
+    fn prior(&self) -> &Prior {
+        &self.0
     }
 }
 
@@ -709,12 +708,13 @@ fn many_doubtful_pivots_are_told_from_lost_ones() {
     let layout = Layout::new(1, 1, &vec![1; unknowns], vec![0], vec![]).unwrap().with_ties(ties).unwrap();
     let mut prior = Prior { weight: vec![0.0; unknowns], right: vec![0.0; unknowns], between: vec![] };
     prior.weight.iter_mut().step_by(2 * Chains::LENGTH).for_each(|weight| *weight = 1e-9);
+    let chains_of = Chains(prior);
     let chain = |chain: usize| (chain * Chains::LENGTH..(chain + 1) * Chains::LENGTH).collect();
     let expected: Vec<Vec<usize>> = (0..chains).skip(1).step_by(2).map(chain).collect();
     let system = System::new(layout, Ordering::Auto).unwrap();
     for count in [1, 3] {
         let options = FactorOptions::default();
-        let factor = done(system.factor(&threads(count), &Chains, &prior, &options, &mut go));
+        let factor = done(system.factor(&threads(count), &chains_of, &options, &mut go));
         let mut found = factor.deficiency().unwrap().blocks();
         found.sort();
         assert_eq!(found, expected);
@@ -727,7 +727,7 @@ fn local_block_without_equations_is_named() {
     let mut dense = Dense::new(layout.clone(), 5);
     dense.prior.weight[layout.local_range(1)].fill(0.0);
     let system = System::new(layout, Ordering::Auto).unwrap();
-    let factor = done(system.factor(&threads(1), &dense, &dense.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads(1), &dense, &FactorOptions::default(), &mut go));
     assert_eq!(factor.deficient_locals, vec![1]);
 }
 
@@ -779,28 +779,28 @@ fn slices_of_other_lengths_are_refused() {
     let dense = block(1, 3, 0);
     let system = System::new(dense.layout.clone(), Ordering::Auto).unwrap();
     let (threads, unknowns) = (threads(1), dense.layout.unknowns());
-    let factor = |prior: &Prior| system.factor(&threads, &dense, prior, &FactorOptions::default(), &mut go);
+    let factor = |of: &Dense| system.factor(&threads, of, &FactorOptions::default(), &mut go);
     let length =
         |field, length, required| SystemError::Layout(LayoutError::Length { field, length, required });
-    let (mut short, mut long) = (dense.prior.clone(), dense.prior.clone());
-    short.weight.pop();
-    long.right.push(0.0);
+    let [mut short, mut long] = [0; 2].map(|seed| block(1, 3, seed));
+    short.prior.weight.pop();
+    long.prior.right.push(0.0);
     assert_eq!(factor(&short).unwrap_err(), length("Prior::weight", unknowns - 1, unknowns));
     assert_eq!(factor(&long).unwrap_err(), length("Prior::right", unknowns + 1, unknowns));
-    let formed = factor(&dense.prior).unwrap();
-    let solve = |prior, options| system.solve(&threads, &formed, &dense, prior, &options, &mut go);
+    let formed = factor(&dense).unwrap();
+    let solve = |of: &Dense, options| system.solve(&threads, &formed, of, &options, &mut go);
     let refused = solve(&short, SolveOptions::default()).unwrap_err();
     assert_eq!(refused, length("Prior::weight", unknowns - 1, unknowns));
     for count in [1, unknowns - 1, 2 * unknowns + 1] {
         let expected = LayoutError::Columns { field: "SolveOptions::rights", length: count, unknowns };
         let rights = vec![0.0; count];
-        let refused = system.solve(&threads, &formed, &dense, &dense.prior, &solved_for(&rights), &mut go);
+        let refused = system.solve(&threads, &formed, &dense, &solved_for(&rights), &mut go);
         assert_eq!(refused.unwrap_err(), SystemError::Layout(expected));
     }
     let outer = SolveOptions { outer: &[0.0], ..SolveOptions::default() };
-    assert_eq!(solve(&dense.prior, outer).unwrap_err(), length("SolveOptions::outer", 1, 0));
+    assert_eq!(solve(&dense, outer).unwrap_err(), length("SolveOptions::outer", 1, 0));
     let options = InvertOptions::default();
-    let refused = system.invert(&threads, formed, &dense, &short, &options, &mut go).unwrap_err();
+    let refused = system.invert(&threads, formed, &short, &options, &mut go).unwrap_err();
     assert_eq!(refused, length("Prior::weight", unknowns - 1, unknowns));
 }
 
@@ -814,9 +814,9 @@ fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
     let inverted = |layout: Layout| {
         let system = System::new(layout, Ordering::Input).unwrap();
         let factoring = FactorOptions::default();
-        let factor = done(system.factor(&threads(1), &dense, &dense.prior, &factoring, &mut go));
+        let factor = done(system.factor(&threads(1), &dense, &factoring, &mut go));
         let options = InvertOptions::default();
-        (done(system.invert(&threads(1), factor, &dense, &dense.prior, &options, &mut go)), system)
+        (done(system.invert(&threads(1), factor, &dense, &options, &mut go)), system)
     };
     let (found, _) = inverted(dense.layout.clone());
     let outside = LayoutError::Block { row: 0, column: 19 };
@@ -835,12 +835,12 @@ fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
     let groups: Vec<u32> = (0..count).map(|group| dense.layout.retained_of(group) as u32).collect();
     let apart = Dense::new(Layout::new(2, 3, &[6; 20], (0..=count).collect(), groups).unwrap(), 3);
     let system = System::new(apart.layout.clone(), Ordering::Input).unwrap();
-    let factor = done(system.factor(&threads(1), &apart, &apart.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&threads(1), &apart, &FactorOptions::default(), &mut go));
     let options = InvertOptions::default();
-    let foreign = done(system.invert(&threads(1), factor, &apart, &apart.prior, &options, &mut go)).selected;
+    let foreign = done(system.invert(&threads(1), factor, &apart, &options, &mut go)).selected;
     let (_, whole) = inverted(dense.layout.clone());
     let rows = dense.rows_of(0);
-    let refused = whole.local_cofactors(&foreign, (&rows, &dense.prior), &rows, 0);
+    let refused = whole.local_cofactors(&foreign, (&rows, &dense.prior.weight), &rows, 0);
     assert!(matches!(refused, Err(LayoutError::Block { .. })));
 }
 

@@ -10,7 +10,7 @@ use crate::cut::{Cut, TREES};
 use photocore::Threads;
 use photocore::normals::{
     Chord, Contribution, Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, LayoutError,
-    Ordering, Prior, ReducedRights, SolveOptions, System, Tie, TieRows,
+    Ordering, Prior, ReducedRights, SolveOptions, System, Tie,
 };
 use proptest::prelude::*;
 
@@ -66,15 +66,19 @@ impl Equations for Piece<'_> {
         }
     }
 
-    fn write_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+    fn write_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
         let (layout, whole) = (&self.layout, self.ties[tie]);
         let width = layout.tie_columns(tie).count();
         for (k, constant) in rows.constant.iter_mut().enumerate() {
             let row = 100_000 + 8 * whole + k;
             *constant = number(self.seed, row, 7);
             let retained = layout.ties()[tie].retained.iter().map(|&block| self.own(block as usize));
-            self.fill(row, &mut rows.coefficients[width * k..][..width], retained);
+            self.fill(row, &mut rows.shared[width * k..][..width], retained);
         }
+    }
+
+    fn prior(&self) -> &Prior {
+        &self.prior
     }
 
     fn contribution(&self, below: usize) -> Option<&Contribution<'_>> {
@@ -177,8 +181,7 @@ fn upward<'a>(
         let mut piece = piece(all, cut, p);
         piece.below = cut.children(p).iter().map(|&child| left[child].take().unwrap()).collect();
         let system = System::new(piece.layout.clone(), ordering).unwrap();
-        let mut factor =
-            done(system.factor(threads, &piece, &piece.prior, &FactorOptions::default(), &mut go));
+        let mut factor = done(system.factor(threads, &piece, &FactorOptions::default(), &mut go));
         assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
         let contribution = factor.take_contribution();
         let outer = system.symbolic().outer_unknowns();
@@ -228,7 +231,7 @@ fn reduced(
                 here[i / places.len() * names.len() + places[i % places.len()]] += value;
             }
         }
-        let of = (piece as &dyn Equations, &piece.prior);
+        let of = piece as &dyn Equations;
         let reduced = done(system.reduce_rights(threads, factor, of, &here, &mut go));
         products.iter_mut().zip(&reduced.products).for_each(|(sum, value)| *sum += value);
         found.push(reduced);
@@ -240,9 +243,9 @@ fn reduced(
 fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threads) {
     let (system, count) = (System::new(all.layout.clone(), ordering).unwrap(), all.layout.unknowns());
     let rights: Vec<f64> = (0..COLUMNS * count).map(|i| number(all.seed, i, 17)).collect();
-    let factor = done(system.factor(threads, all, &all.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(threads, all, &FactorOptions::default(), &mut go));
     let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
-    let expected = done(system.solve(threads, &factor, all, &all.prior, &options, &mut go));
+    let expected = done(system.solve(threads, &factor, all, &options, &mut go));
     let largest = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let nodes = upward(all, cut, ordering, threads);
     let (mut found, products) = reduced(&rights, (all, cut, &nodes), threads);
@@ -254,7 +257,7 @@ fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Thre
     let mut handed: Vec<Vec<f64>> = vec![vec![]; nodes.len()];
     for (p, (piece, system, factor)) in nodes.into_iter().enumerate().rev() {
         let (own, names) = (system.layout(), unknowns_of(all, &piece));
-        let (of, outer) = ((&piece as &dyn Equations, &piece.prior), std::mem::take(&mut handed[p]));
+        let (of, outer) = (&piece as &dyn Equations, std::mem::take(&mut handed[p]));
         let reduced = found.remove(p);
         let x = done(system.solve_reduced_rights(threads, &factor, of, reduced, &outer, &mut go));
         for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
@@ -272,9 +275,9 @@ fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Thre
 fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threads) {
     let elsewhere = whole(all.layout.clone(), all.seed.wrapping_add(1));
     let system = System::new(all.layout.clone(), ordering).unwrap();
-    let factor = done(system.factor(threads, all, &all.prior, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(threads, all, &FactorOptions::default(), &mut go));
     assert!(factor.has_cached());
-    let of = (&elsewhere as &dyn Equations, &elsewhere.prior);
+    let of = &elsewhere as &dyn Equations;
     let Chord { step: expected, decrease, .. } = done(system.chord(threads, &factor, of, &mut go));
     let largest = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let nodes = upward(all, cut, ordering, threads);
@@ -286,7 +289,7 @@ fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threa
             let left = found[child].1.left();
             own.unknowns_of(blocks).zip(left).for_each(|(unknown, value)| rights[unknown] += value);
         }
-        let of = (&piece as &dyn Equations, &piece.prior);
+        let of = &piece as &dyn Equations;
         let reduced = done(system.reduce_chord(threads, factor, of, &rights, &mut go));
         found.push((piece, reduced));
     }
@@ -295,7 +298,7 @@ fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threa
     let mut handed: Vec<Vec<f64>> = vec![vec![]; nodes.len()];
     for (p, (piece, system, factor)) in nodes.into_iter().enumerate().rev() {
         let (own, outer) = (system.layout(), std::mem::take(&mut handed[p]));
-        let (of, (_, reduced)) = ((&piece as &dyn Equations, &piece.prior), found.remove(p));
+        let (of, (_, reduced)) = (&piece as &dyn Equations, found.remove(p));
         let chord = done(system.solve_reduced_rights(threads, &factor, of, reduced, &outer, &mut go));
         for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
             handed[child] = own.unknowns_of(blocks).map(|unknown| chord[unknown]).collect();
@@ -312,11 +315,10 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
     let cut = Cut::new(tree, &touched(&layout), node_of);
     let all = whole(layout, seed);
     let system = System::new(all.layout.clone(), ordering).unwrap();
-    let factor = done(system.factor(&threads, &all, &all.prior, &FactorOptions::default(), &mut go));
-    let expected = done(system.solve(&threads, &factor, &all, &all.prior, &SolveOptions::default(), &mut go));
+    let factor = done(system.factor(&threads, &all, &FactorOptions::default(), &mut go));
+    let expected = done(system.solve(&threads, &factor, &all, &SolveOptions::default(), &mut go));
     let (sum, decrease) = (factor.sum_of_squares, factor.decrease);
-    let cofactors =
-        done(system.invert(&threads, factor, &all, &all.prior, &InvertOptions::default(), &mut go));
+    let cofactors = done(system.invert(&threads, factor, &all, &InvertOptions::default(), &mut go));
     compare_rights(&all, &cut, ordering, &threads);
     compare_chord(&all, &cut, ordering, &threads);
     let nodes = upward(&all, &cut, ordering, &threads);
@@ -336,7 +338,6 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
             &threads,
             &factor,
             &piece,
-            &piece.prior,
             &SolveOptions { outer: &outer_step, ..SolveOptions::default() },
             &mut go,
         ));
@@ -348,7 +349,6 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
             &threads,
             factor,
             &piece,
-            &piece.prior,
             &InvertOptions { outer: &outer_cofactors, ..InvertOptions::default() },
             &mut go,
         ));
@@ -373,8 +373,7 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
         }
         let rows = own.rows();
         let of_groups = piece.groups.iter().flat_map(|&group| rows * group..rows * (group + 1));
-        let first = rows * all.layout.groups();
-        let of_ties = piece.ties.iter().flat_map(|&tie| all.layout.tie_rows(tie)).map(|row| first + row);
+        let of_ties = piece.ties.iter().flat_map(|&tie| all.layout.equations_of_tie(tie));
         for (share, row) in found.cofactors.equations.iter().zip(of_groups.chain(of_ties)) {
             assert_close(*share, cofactors.cofactors.equations[row], 1e-9, "adjusted equation");
         }
@@ -477,8 +476,7 @@ fn bits_of_a_node_do_not_depend_on_the_number_of_threads() {
         for p in 0..2 {
             let piece = piece(&all, &cut, p);
             let system = System::new(piece.layout.clone(), Ordering::Auto).unwrap();
-            let mut factor =
-                done(system.factor(&threads, &piece, &piece.prior, &FactorOptions::default(), &mut go));
+            let mut factor = done(system.factor(&threads, &piece, &FactorOptions::default(), &mut go));
             let Contribution { matrix, right, diagonal } = factor.take_contribution();
             numbers.extend([matrix, right, diagonal].concat());
             assert!(factor.take_contribution().matrix.is_empty(), "handed out once");

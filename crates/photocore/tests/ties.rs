@@ -10,7 +10,7 @@ use photocore::adjustment::{
     Datum, DatumError, Evaluated, Leverages, Linearized, Loss, Method, Model, Motions, Options, Problem,
     Published, Status, Stop, adjust,
 };
-use photocore::normals::{GroupRows, Layout, Ordering, System, Tie, TieRows};
+use photocore::normals::{GroupRows, Layout, Ordering, System, Tie};
 
 use crate::scatter;
 
@@ -47,14 +47,14 @@ impl Evaluated for At<'_> {
         rows.retained.copy_from_slice(&partials.map(|value| -value));
     }
 
-    fn observe_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+    fn observe_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
         let (net, layout) = (self.net, &self.net.layout);
         let retained = &layout.ties()[tie].retained;
         let [from, to] = [0, 1].map(|end| layout.retained_range(retained[end] as usize).start);
         let (left, partials) = net.distance(&self.values, layout.groups() + tie, from, to);
         rows.constant[0] = left;
-        rows.coefficients[..2].copy_from_slice(&partials);
-        rows.coefficients[2..].copy_from_slice(&partials.map(|value| -value));
+        rows.shared[..2].copy_from_slice(&partials);
+        rows.shared[2..].copy_from_slice(&partials.map(|value| -value));
     }
 }
 

@@ -377,12 +377,11 @@ impl Node {
         }
         let problem = self.problem();
         let equations = ObservationEquations::new(problem, None, state, &self.held, threads);
-        let prior = problem.prior_equations(&problem.terms(state), &self.held);
         self.zero_fixed(formed, &mut rights);
-        rights.iter_mut().zip(&prior.right).for_each(|(right, own)| *right += own);
+        rights.iter_mut().zip(&equations.prior().right).for_each(|(right, own)| *right += own);
         let mut between = between(watch, Phase::Solve, problem.layout().locals());
-        let (factor, of) = (&formed.linearized.factor, (&equations as &dyn Equations, &prior));
-        let reduced = problem.system.reduce_chord(threads, factor, of, &rights, &mut between);
+        let factor = &formed.linearized.factor;
+        let reduced = problem.system.reduce_chord(threads, factor, &equations, &rights, &mut between);
         let reduced = reduced.map_err(|error| self.named(error.into()))?;
         let found = (reduced.left(), reduced.products[0]);
         formed.reduced = Some(Reduced::Chord(reduced));
@@ -409,8 +408,8 @@ impl Node {
         let problem = self.problem();
         let equations = linearized.equations(problem, threads);
         let mut between = between(watch, Phase::Solve, problem.layout().locals());
-        let of = (&equations as &dyn Equations, &linearized.prior);
-        let reduced = problem.system.reduce_rights(threads, &linearized.factor, of, &rights, &mut between);
+        let reduced =
+            problem.system.reduce_rights(threads, &linearized.factor, &equations, &rights, &mut between);
         let reduced = reduced.map_err(|error| self.named(error.into()))?;
         let found = (reduced.left(), reduced.products.clone());
         formed.reduced = Some(Reduced::Datum(reduced));
@@ -439,15 +438,14 @@ impl Node {
     ) -> Result<Vec<f64>, NetworkError> {
         let (linearized, problem) = (&formed.linearized, self.problem());
         let equations = linearized.equations(problem, threads);
-        let of = (&equations as &dyn Equations, &linearized.prior);
         let mut between = between(watch, Phase::Solve, problem.layout().locals());
         let (system, factor) = (&problem.system, &linearized.factor);
         let found = match formed.reduced.take() {
             Some(Reduced::Chord(reduced)) if reduced.left().len() == outer.len() => {
-                system.solve_reduced_rights(threads, factor, of, reduced, outer, &mut between)
+                system.solve_reduced_rights(threads, factor, &equations, reduced, outer, &mut between)
             }
             Some(Reduced::Datum(reduced)) if reduced.left().len() == outer.len() => {
-                system.solve_reduced_rights(threads, factor, of, reduced, outer, &mut between)
+                system.solve_reduced_rights(threads, factor, &equations, reduced, outer, &mut between)
             }
             _ => return Err(NetworkError::State),
         };

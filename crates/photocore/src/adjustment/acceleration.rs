@@ -242,7 +242,7 @@ impl<'a> Run<'a, '_> {
         iteration: &Iteration,
     ) -> Option<(Vec<f64>, Iteration)> {
         let all = self.secants.all(step);
-        let products = state.equations.products(self.threads, &state.linearized.prior, &all);
+        let products = state.equations.products(self.threads, &all);
         let shares = self.secants.shares(&products)?;
         let own = self.secants.corrected(step, &shares);
         let largest_change = (&products * &shares).dot(&shares).max(0.0).sqrt();
@@ -370,10 +370,8 @@ impl<'a> Run<'a, '_> {
     ) -> Result<(ObservationEquations<'a>, Chord), AdjustError> {
         let (problem, threads) = (self.problem, self.threads);
         let equations = ObservationEquations::new(problem, None, values, &self.datum, threads);
-        let prior = problem.prior_equations(&problem.terms(values), &self.datum);
         let mut between = between(&mut *self.watch, Phase::Solve, problem.layout().locals());
-        let of = (&equations as _, &prior);
-        let chord = problem.system.chord(threads, &state.linearized.factor, of, &mut between);
+        let chord = problem.system.chord(threads, &state.linearized.factor, &equations, &mut between);
         Ok((equations, chord?))
     }
 }

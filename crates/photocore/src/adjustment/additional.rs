@@ -10,12 +10,10 @@ use std::ops::Range;
 use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
 
-use super::equations::{ObservationEquations, Row};
+use super::equations::{EquationOf, ObservationEquations, Row};
 use super::group_test::Few;
 use super::linearized::Linearized;
-use super::loss::Reweighting;
 use super::problem::AnyProblem;
-use super::terms::Terms;
 use super::walk::Buffers;
 use crate::normals::{LANES, Layout};
 use crate::{Threads, parallel};
@@ -35,29 +33,6 @@ impl Equation<'_> {
     pub fn coefficients(&self) -> impl Iterator<Item = (usize, f64)> {
         self.row.taken()
     }
-}
-
-/// The observation of an equation.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum EquationOf {
-    /// A row of a group, which belongs to a local block.
-    Group {
-        /// The group.
-        group: usize,
-        /// Its local block.
-        local: usize,
-        /// The row in the group.
-        row: usize,
-    },
-    /// A row of a tie.
-    Tie {
-        /// The tie.
-        tie: usize,
-        /// The row in the tie.
-        row: usize,
-    },
-    /// An unknown as an observation of itself.
-    Unknown(usize),
 }
 
 /// Additional parameters: which computed observations depend on them, and how.
@@ -118,7 +93,6 @@ pub(super) struct LocalRows {
 /// A problem at given values with additional parameters.
 pub(super) struct Extended<'a> {
     equations: ObservationEquations<'a>,
-    terms: Terms<'a>,
     fixed: Vec<bool>,
     parameters: &'a dyn AdditionalParameters,
 }
@@ -150,8 +124,9 @@ impl LocalRows {
     }
 
     /// Adds an equation; `first` is the first unknown of the block.
-    fn push(&mut self, to: &Extended<'_>, (of, sd, row): (EquationOf, f64, &Row<'_>), first: usize) {
+    fn push(&mut self, to: &Extended<'_>, row: &Row<'_>, first: usize) {
         let Self { width, of: all, constants, own, ends, others, partials, scratch, shared } = self;
+        let (of, sd) = (row.of, to.equations.deviation(row.number));
         all.push(of);
         scratch.clear();
         to.parameters.partials(&Equation { of, sd, row }, shared, scratch);
@@ -183,65 +158,31 @@ impl LocalRows {
 }
 
 impl<'a> Extended<'a> {
-    /// Evaluates a problem at given values with some unknowns constrained.
+    /// Adds parameters to equations at values with some unknowns constrained.
     pub fn new(
-        problem: &'a AnyProblem<'a>,
-        reweighting: Option<Reweighting>,
-        (values, held): (&'a [f64], &[usize]),
+        equations: ObservationEquations<'a>,
+        held: &[usize],
         parameters: &'a dyn AdditionalParameters,
-        threads: &Threads,
     ) -> Self {
-        let equations = ObservationEquations::new(problem, reweighting, values, held, threads);
-        Self {
-            equations: equations.with_fixed_columns(),
-            terms: problem.terms(values),
-            fixed: problem.fixed(held),
-            parameters,
-        }
+        let fixed = equations.problem().fixed(held);
+        Self { equations: equations.with_fixed_columns(), fixed, parameters }
     }
 
     /// Writes the equations of a local block: its groups, its ties and its unknowns as observations.
     pub fn write(&self, buffers: &mut Buffers, local: usize, rows: &mut LocalRows) {
-        let problem = self.equations.problem();
-        let layout = problem.layout();
-        let range = layout.local_range(local);
-        let (first, width, size) = (range.start, range.len(), layout.rows());
-        rows.clear(width);
-        self.equations.each_row(buffers, local, |row| {
-            let of = EquationOf::Group { group: row.number / size, local, row: row.number % size };
-            rows.push(self, (of, self.equations.deviation(row.number), row), first);
-        });
-        for tie in layout.ties_of(local).iter().map(|&tie| tie as usize) {
-            let before = layout.groups() * size + layout.tie_rows(tie).start;
-            self.equations.each_row_of_tie(buffers, tie, |row| {
-                let of = EquationOf::Tie { tie, row: row.number - before };
-                rows.push(self, (of, self.equations.deviation(row.number), row), first);
-            });
-        }
-        self.equations.each_prior(&self.terms, range, |unknown, row| {
-            rows.push(self, (EquationOf::Unknown(unknown), problem.sd[unknown], row), first);
-        });
+        let range = self.equations.problem().layout().local_range(local);
+        rows.clear(range.len());
+        self.equations.each_row_of_local(buffers, local, |row| rows.push(self, row, range.start));
     }
 
     /// Calls `add` with each equation of retained blocks, as a block without unknowns of its own: ties, then unknowns as observations.
     pub fn each_retained(&self, mut add: impl FnMut(&LocalRows)) {
-        let problem = self.equations.problem();
-        let (layout, mut buffers) = (problem.layout(), Buffers::default());
-        let (groups, first) = (layout.groups() * layout.rows(), layout.all_locals().end);
+        let first = self.equations.problem().layout().all_locals().end;
         let mut rows = LocalRows::default();
-        let mut add = |of, sd, row: &Row<'_>| {
+        self.equations.each_other_row(true, |row| {
             rows.clear(0);
-            rows.push(self, (of, sd, row), first);
+            rows.push(self, row, first);
             add(&rows);
-        };
-        for tie in (0..layout.ties().len()).filter(|&tie| layout.ties()[tie].local.is_none()) {
-            self.equations.each_row_of_tie(&mut buffers, tie, |row| {
-                let of = EquationOf::Tie { tie, row: row.number - groups - layout.tie_rows(tie).start };
-                add(of, self.equations.deviation(row.number), row);
-            });
-        }
-        self.equations.each_prior(&self.terms, first..layout.unknowns(), |unknown, row| {
-            add(EquationOf::Unknown(unknown), problem.sd[unknown], row);
         });
     }
 
@@ -436,12 +377,12 @@ impl Sums {
 
 impl Linearized {
     pub(super) fn extended<'a>(
-        &'a self,
+        &self,
         problem: &'a AnyProblem<'a>,
         parameters: &'a dyn AdditionalParameters,
         threads: &Threads,
     ) -> Extended<'a> {
-        Extended::new(problem, self.reweighting, (&self.values, &self.held), parameters, threads)
+        Extended::new(self.equations(problem, threads), &self.held, parameters)
     }
 
     /// Tests additional parameters against the residuals at these values.

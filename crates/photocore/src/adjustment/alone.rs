@@ -42,7 +42,7 @@ impl Leverages {
     /// Returns the cofactors if only the unknowns of each local block are free.
     pub fn alone(&self, problem: &AnyProblem<'_>, threads: &Threads) -> Alone {
         let (layout, extended) =
-            (problem.layout(), Extended::new(problem, None, (&self.values, &self.held), &Nothing, threads));
+            (problem.layout(), Extended::new(self.equations(problem, threads), &self.held, &Nothing));
         let size = layout.rows();
         let part = |locals: Range<usize>| {
             let (mut rows, mut buffers, mut found) =

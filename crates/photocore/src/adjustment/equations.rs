@@ -2,16 +2,17 @@
 //!
 //! Products of their matrix A with vectors.
 
-use std::ops::Range;
+use std::ops::{Add, Range};
+use std::sync::OnceLock;
 
 use nalgebra::DMatrix;
 use smallvec::SmallVec;
 
 use super::loss::Reweighting;
-use super::problem::{AnyProblem, Evaluated};
-use super::terms::Terms;
+use super::problem::{AnyProblem, Evaluated, is_weighted};
+use super::terms::{Term, Terms};
 use super::walk::Buffers;
-use crate::normals::{Contribution, Equations, GroupRows, Prior, TieRows};
+use crate::normals::{Contribution, Equations, GroupRows, Prior};
 use crate::{Threads, parallel};
 
 /// Number of parts of the loop over local blocks, for sums that are independent of the number of threads.
@@ -22,6 +23,9 @@ const PARTS: usize = 16;
 pub struct ObservationEquations<'a> {
     problem: &'a AnyProblem<'a>,
     at: Box<dyn Evaluated + 'a>,
+    terms: Terms,
+    /// Normal equations of the terms.
+    prior: OnceLock<Prior>,
     /// Standard deviations of the observations; infinite for excluded ones.
     observation_sd: &'a [f64],
     /// Flags of fixed or constrained unknowns; None if all are free.
@@ -31,10 +35,35 @@ pub struct ObservationEquations<'a> {
     contributions: &'a [Contribution<'a>],
 }
 
+/// The observation of an equation.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum EquationOf {
+    /// A row of a group, which belongs to a local block.
+    Group {
+        /// The group.
+        group: usize,
+        /// Its local block.
+        local: usize,
+        /// The row in the group.
+        row: usize,
+    },
+    /// A row of a tie.
+    Tie {
+        /// The tie.
+        tie: usize,
+        /// The row in the tie.
+        row: usize,
+    },
+    /// An unknown as an observation of itself.
+    Unknown(usize),
+}
+
 /// Single equation of unit weight.
 #[derive(Debug)]
 #[doc(hidden)]
 pub struct Row<'a> {
+    /// Its observation.
+    pub of: EquationOf,
     /// Its index, in the order of groups and rows, then of ties and rows, then of unknowns.
     pub number: usize,
     /// Observed minus computed.
@@ -73,19 +102,30 @@ impl<'a> ObservationEquations<'a> {
         held: &[usize],
         threads: &Threads,
     ) -> Self {
-        threads.install(|| Self::evaluated(problem, problem.model.at(values), held, reweighting))
+        let at = threads.install(|| problem.model.at(values));
+        Self::evaluated(problem, at, values, held, reweighting)
     }
 
-    /// Creates the equations of an evaluated model.
+    /// Creates the equations of a model that is evaluated at given values.
     pub fn evaluated(
         problem: &'a AnyProblem<'a>,
         at: Box<dyn Evaluated + 'a>,
+        values: &[f64],
         held: &[usize],
         reweighting: Option<Reweighting>,
     ) -> Self {
         let fixed = Some(problem.fixed(held)).filter(|fixed| fixed.contains(&true));
-        let observation_sd = &problem.observation_sd;
-        Self { problem, at, observation_sd, fixed, reweighting, contributions: &[] }
+        let (terms, observation_sd) = (problem.terms(values), &problem.observation_sd[..]);
+        Self {
+            problem,
+            at,
+            terms,
+            prior: OnceLock::new(),
+            observation_sd,
+            fixed,
+            reweighting,
+            contributions: &[],
+        }
     }
 
     /// Adds contributions of child systems.
@@ -106,13 +146,6 @@ impl<'a> ObservationEquations<'a> {
         self
     }
 
-    /// Creates the equations with all columns, including fixed unknowns, and without a loss.
-    pub fn of_all(problem: &'a AnyProblem<'a>, values: &[f64], threads: &Threads) -> Self {
-        let at = threads.install(|| problem.model.at(values));
-        let observation_sd = &problem.observation_sd;
-        Self { problem, at, observation_sd, fixed: None, reweighting: None, contributions: &[] }
-    }
-
     /// Restores the columns of fixed and constrained unknowns.
     pub fn with_fixed_columns(self) -> Self {
         Self { fixed: None, ..self }
@@ -123,9 +156,15 @@ impl<'a> ObservationEquations<'a> {
         self.problem
     }
 
-    /// Standard deviation of an observation.
-    pub fn deviation(&self, observation: usize) -> f64 {
-        self.observation_sd[observation]
+    /// Returns the prior terms.
+    pub fn terms(&self) -> &Terms {
+        &self.terms
+    }
+
+    /// Standard deviation of the observation of an equation.
+    pub fn deviation(&self, equation: usize) -> f64 {
+        let unknown = equation.checked_sub(self.observation_sd.len());
+        unknown.map_or_else(|| self.observation_sd[equation], |unknown| self.problem.sd[unknown])
     }
 
     /// Returns the reweighting by the loss.
@@ -138,63 +177,73 @@ impl<'a> ObservationEquations<'a> {
         &*self.at
     }
 
-    /// Calls `take` with the rows of a local block.
+    /// Calls `take` with the rows of the groups of a local block.
     #[inline(always)]
     pub fn each_row(&self, buffers: &mut Buffers, local: usize, mut take: impl FnMut(&Row<'_>)) {
-        let layout = self.problem.layout();
-        let mut columns = std::mem::take(&mut buffers.columns);
+        let (layout, Buffers { rows, columns }) = (self.problem.layout(), buffers);
         for group in layout.groups_of(local) {
             columns.clear();
             columns.extend(layout.local_range(local));
             columns.extend(layout.retained_range(layout.retained_of(group)));
             columns.extend(layout.shared_columns(group));
-            let mut rows = buffers.rows(layout, group);
+            let mut rows = rows.group(layout, group);
             self.write(local, group, &mut rows);
-            let GroupRows { constant, local: own, retained, shared } = rows;
-            for (row, &constant) in constant.iter().enumerate() {
-                let coefficients = [&*own, &*retained, &*shared].map(|part| {
-                    let width = part.len() / layout.rows();
-                    &part[row * width..][..width]
-                });
-                let number = group * layout.rows() + row;
-                take(&Row { number, constant, columns: &columns, coefficients });
-            }
+            let of = |row| EquationOf::Group { group, local, row };
+            rows.each(columns, group * layout.rows(), of, &mut take);
         }
-        buffers.columns = columns;
-    }
-
-    /// Calls `take` with the tie number and row of every tie.
-    pub fn each_row_of_ties(&self, mut take: impl FnMut(usize, &Row<'_>)) {
-        let mut buffers = Buffers::default();
-        (0..self.problem.layout().ties().len())
-            .for_each(|tie| self.each_row_of_tie(&mut buffers, tie, |row| take(tie, row)));
     }
 
     /// Calls `take` with the rows of a tie.
     #[inline(always)]
     pub fn each_row_of_tie(&self, buffers: &mut Buffers, tie: usize, mut take: impl FnMut(&Row<'_>)) {
-        let layout = self.problem.layout();
-        let first = layout.groups() * layout.rows() + layout.tie_rows(tie).start;
-        let Buffers { tie: buffer, columns, .. } = buffers;
+        let (layout, Buffers { rows, columns }) = (self.problem.layout(), buffers);
         columns.clear();
         columns.extend(layout.tie_columns(tie));
-        let mut rows = buffer.rows(layout, tie);
+        let mut rows = rows.tie(layout, tie);
         self.write_tie(tie, &mut rows);
-        let each = rows.constant.iter().zip(rows.coefficients.chunks_exact(columns.len().max(1)));
-        for (number, (&constant, own)) in (first..).zip(each) {
-            take(&Row { number, constant, columns, coefficients: [own, &[], &[]] });
+        let of = |row| EquationOf::Tie { tie, row };
+        rows.each(columns, layout.equations_of_tie(tie).start, of, &mut take);
+    }
+
+    /// Calls `take` with the row of each weighted unknown of a range, as an observation of itself.
+    pub fn each_prior(&self, buffers: &mut Buffers, of: Range<usize>, mut take: impl FnMut(&Row<'_>)) {
+        let Buffers { rows, columns } = buffers;
+        for term in self.terms.within(of) {
+            columns.clear();
+            columns.extend(term.unknowns());
+            let rows = rows.rows(columns.len(), [0, 0, columns.len()]);
+            rows.constant.copy_from_slice(term.constant);
+            rows.shared.copy_from_slice(term.coefficients);
+            if let Some(fixed) = &self.fixed {
+                leave_out(rows.shared, columns.len(), term.unknowns().map(|unknown| fixed[unknown]));
+            }
+            let of = |row| EquationOf::Unknown(term.first + row);
+            rows.each(columns, self.observation_sd.len() + term.first, of, &mut |row: &Row<'_>| {
+                if is_weighted(self.deviation(row.number)) {
+                    take(row);
+                }
+            });
         }
     }
 
-    /// Calls `take` with each weighted unknown of a range and its row, as an observation of itself.
-    pub fn each_prior(&self, terms: &Terms<'_>, of: Range<usize>, mut take: impl FnMut(usize, &Row<'_>)) {
-        let first = self.observation_sd.len();
-        let is_free = |unknown: usize| self.fixed.as_ref().is_none_or(|fixed| !fixed[unknown]);
-        terms.rows_within(of, |unknown, row, constant| {
-            let (columns, own): (Vec<usize>, Vec<f64>) = row.filter(|own| is_free(own.0)).unzip();
-            let coefficients = [&own[..], &[], &[]];
-            take(unknown, &Row { number: first + unknown, constant, columns: &columns, coefficients });
-        });
+    /// Calls `take` with all rows of a local block: of groups, ties and weighted unknowns.
+    pub fn each_row_of_local(&self, buffers: &mut Buffers, local: usize, mut take: impl FnMut(&Row<'_>)) {
+        let layout = self.problem.layout();
+        self.each_row(buffers, local, &mut take);
+        for &tie in layout.ties_of(local) {
+            self.each_row_of_tie(buffers, tie as usize, &mut take);
+        }
+        self.each_prior(buffers, layout.local_range(local), take);
+    }
+
+    /// Calls `take` with the rows of ties and weighted unknowns, except for those of local blocks if `retained`.
+    pub fn each_other_row(&self, retained: bool, mut take: impl FnMut(&Row<'_>)) {
+        let (layout, mut buffers) = (self.problem.layout(), Buffers::default());
+        for tie in (0..layout.ties().len()).filter(|&tie| !retained || layout.ties()[tie].local.is_none()) {
+            self.each_row_of_tie(&mut buffers, tie, &mut take);
+        }
+        let first = if retained { layout.all_locals().end } else { 0 };
+        self.each_prior(&mut buffers, first..layout.unknowns(), take);
     }
 
     /// Sums over the rows of groups and of ties, in parts of consecutive rows that depend on the layout only.
@@ -217,12 +266,12 @@ impl<'a> ObservationEquations<'a> {
         parts
     }
 
-    /// Computes A x of all equations and priors for several x: one number per x for each row, in order.
-    pub fn times(&self, threads: &Threads, terms: &Terms<'_>, xs: &[&[f64]]) -> Vec<f64> {
+    /// Computes A x of all equations for several x: one number per x for each row, in order.
+    pub fn times(&self, threads: &Threads, xs: &[&[f64]]) -> Vec<f64> {
         let add = |found: &mut Vec<f64>, row: &Row<'_>| found.extend(xs.iter().map(|x| row.change(x)));
         let mut all = self.fold_rows(threads, Vec::new, add).concat();
         all.resize(xs.len() * self.problem.equations(), 0.0);
-        self.each_prior(terms, 0..self.problem.sd.len(), |_, row| {
+        self.each_prior(&mut Buffers::default(), 0..self.problem.sd.len(), |row| {
             let found = &mut all[row.number * xs.len()..][..xs.len()];
             found.iter_mut().zip(xs).for_each(|(found, x)| *found = row.change(x));
         });
@@ -267,7 +316,7 @@ impl<'a> ObservationEquations<'a> {
             }
         }
         let mut z = vec![0.0; count];
-        self.each_row_of_ties(|_, row| {
+        self.each_other_row(false, |row| {
             put(row, &mut z);
             for (right, &z) in rights.chunks_exact_mut(unknowns).zip(&z) {
                 row.taken().for_each(|(unknown, value)| right[unknown] += value * z);
@@ -276,54 +325,72 @@ impl<'a> ObservationEquations<'a> {
         rights
     }
 
-    /// Returns the products u^T N v of all pairs of steps, with priors in N.
-    pub fn products(&self, threads: &Threads, prior: &Prior, steps: &[&[f64]]) -> DMatrix<f64> {
-        let zeros = || DMatrix::<f64>::zeros(steps.len(), steps.len());
-        let add = |sum: &mut DMatrix<f64>, weight: f64, u: &[f64], v: &[f64]| {
-            for (j, v) in v.iter().enumerate() {
-                sum.column_mut(j).iter_mut().zip(u).for_each(|(sum, u)| *sum += weight * u * v);
-            }
-        };
-        // Stored by unknown.
-        let unknowns = 0..steps.first().map_or(0, |step| step.len());
-        let turned: Vec<f64> = unknowns.flat_map(|k| steps.iter().map(move |step| step[k])).collect();
-        let of_unknown = |unknown: usize| &turned[unknown * steps.len()..][..steps.len()];
-        let changes = |taken: &mut dyn Iterator<Item = (usize, f64)>| {
-            let mut changes = SmallVec::<[f64; 16]>::from_elem(0.0, steps.len());
-            taken.for_each(|(k, a)| {
-                changes.iter_mut().zip(of_unknown(k)).for_each(|(sum, change)| *sum += a * change);
-            });
-            changes
-        };
-        let observed = self.fold_rows(threads, zeros, |sum, row| {
-            let own = changes(&mut row.taken());
-            add(sum, 1.0, &own, &own);
-        });
-        let mut sum = observed.into_iter().fold(zeros(), |sum, part| sum + part);
-        for (unknown, &weight) in prior.weight.iter().enumerate().filter(|&(_, &weight)| weight != 0.0) {
-            let own = of_unknown(unknown);
-            add(&mut sum, weight, own, own);
-        }
-        for &(i, j, weight) in &prior.between {
-            let (own, other) = (of_unknown(i), of_unknown(j));
-            add(&mut sum, weight, own, other);
-            add(&mut sum, weight, other, own);
-        }
+    /// Sums over all rows, in an order that depends on the layout only.
+    fn sum_rows<T: Send + Add<Output = T>>(
+        &self,
+        threads: &Threads,
+        start: impl Fn() -> T + Sync,
+        add: impl Fn(&mut T, &Row<'_>) + Sync,
+    ) -> T {
+        let observed = self.fold_rows(threads, &start, &add);
+        let mut sum = observed.into_iter().fold(start(), |sum, part| sum + part);
+        self.each_prior(&mut Buffers::default(), 0..self.problem.sd.len(), |row| add(&mut sum, row));
         sum
     }
 
-    /// Returns the decrease of the weighted sum of squares of equations and priors by a step: sum of Ax (2 l - Ax).
-    pub fn decrease(&self, threads: &Threads, prior: &Prior, step: &[f64]) -> f64 {
-        let add = |sum: &mut f64, row: &Row<'_>| {
-            let change = row.change(step);
-            *sum += change * (2.0 * row.constant - change);
-        };
-        let observed = self.fold_rows(threads, || 0.0, add);
-        let priors = step.iter().zip(&prior.weight).zip(&prior.right);
-        let between = prior.between.iter().map(|&(i, j, weight)| 2.0 * weight * step[i] * step[j]);
-        observed.iter().sum::<f64>()
-            + priors.map(|((x, weight), right)| x * (2.0 * right - weight * x)).sum::<f64>()
-            - between.sum::<f64>()
+    /// Returns the products u^T N v of all pairs of steps.
+    pub fn products(&self, threads: &Threads, steps: &[&[f64]]) -> DMatrix<f64> {
+        // Stored by unknown.
+        let unknowns = 0..steps.first().map_or(0, |step| step.len());
+        let turned: Vec<f64> = unknowns.flat_map(|k| steps.iter().map(move |step| step[k])).collect();
+        let zeros = || DMatrix::<f64>::zeros(steps.len(), steps.len());
+        self.sum_rows(threads, zeros, |sum, row| {
+            let mut changes = SmallVec::<[f64; 16]>::from_elem(0.0, steps.len());
+            for (unknown, a) in row.taken() {
+                let own = &turned[unknown * steps.len()..][..steps.len()];
+                changes.iter_mut().zip(own).for_each(|(sum, change)| *sum += a * change);
+            }
+            for (j, v) in changes.iter().enumerate() {
+                sum.column_mut(j).iter_mut().zip(&changes).for_each(|(sum, u)| *sum += u * v);
+            }
+        })
+    }
+
+    /// Returns the decrease of the weighted sum of squares by a step: sum of Ax (2 l - Ax).
+    pub fn decrease(&self, threads: &Threads, step: &[f64]) -> f64 {
+        self.sum_rows(
+            threads,
+            || 0.0,
+            |sum, row| {
+                let change = row.change(step);
+                *sum += change * (2.0 * row.constant - change);
+            },
+        )
+    }
+
+    /// Forms the normal equations of the terms. A fixed or constrained unknown has the equation x = 0 with unit weight instead of others.
+    /// Outer unknowns have zero weight here.
+    fn form_prior(&self) -> Prior {
+        let layout = self.problem.layout();
+        let is_fixed = |unknown: usize| self.fixed.as_ref().is_some_and(|fixed| fixed[unknown]);
+        let weight = (0..layout.unknowns()).map(|i| f64::from(u8::from(is_fixed(i)))).collect();
+        let mut prior = Prior { weight, right: vec![0.0; layout.unknowns()], between: vec![] };
+        for term in self.terms.within(0..layout.unknowns()) {
+            add_term(&mut prior, &term, is_fixed);
+        }
+        layout.unknowns_of(layout.outer()).for_each(|unknown| prior.weight[unknown] = 0.0);
+        prior
+    }
+}
+
+/// Adds A^T A and A^T l of a term, except for fixed unknowns.
+fn add_term(prior: &mut Prior, term: &Term<'_>, is_fixed: impl Fn(usize) -> bool) {
+    for (i, unknown) in term.unknowns().enumerate().filter(|&(_, unknown)| !is_fixed(unknown)) {
+        let product = |j: usize| term.rows().map(|row| row[i] * row[j]).sum::<f64>();
+        prior.weight[unknown] = product(i);
+        prior.right[unknown] = term.rows().zip(term.constant).map(|(row, constant)| row[i] * constant).sum();
+        let others = (0..i).filter(|&j| !is_fixed(term.first + j));
+        prior.between.extend(others.map(|j| (unknown, term.first + j, product(j))));
     }
 }
 
@@ -351,18 +418,22 @@ impl Equations for ObservationEquations<'_> {
         }
     }
 
-    fn write_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+    fn write_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
         let layout = self.problem.layout();
         self.at.observe_tie(tie, rows);
-        let first = layout.groups() * layout.rows();
-        let sd = &self.observation_sd[first..][layout.tie_rows(tie)];
-        weigh(sd, rows.constant, [&mut *rows.coefficients]);
-        if let Some(reweighting) = self.reweighting {
-            reweighting.apply(rows.constant, &mut [&mut *rows.coefficients]);
-        }
+        rows.weigh(&self.observation_sd[layout.equations_of_tie(tie)]);
+        self.reweigh(rows);
         if let Some(fixed) = &self.fixed {
-            leave_out(rows.coefficients, sd.len(), layout.tie_columns(tie).map(|unknown| fixed[unknown]));
+            leave_out(
+                rows.of_tie(),
+                layout.ties()[tie].rows,
+                layout.tie_columns(tie).map(|unknown| fixed[unknown]),
+            );
         }
+    }
+
+    fn prior(&self) -> &Prior {
+        self.prior.get_or_init(|| self.form_prior())
     }
 
     fn contribution(&self, below: usize) -> Option<&Contribution<'_>> {
@@ -374,22 +445,47 @@ impl ObservationEquations<'_> {
     /// Reweights equations of unit weight by the loss, and zeroes the columns of fixed unknowns.
     #[inline(always)]
     fn adapt(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        let GroupRows { constant, local: own, retained, shared } = rows;
-        if let Some(reweighting) = self.reweighting {
-            reweighting.apply(constant, &mut [&mut **own, &mut **retained, &mut **shared]);
-        }
+        self.reweigh(rows);
         if let Some(fixed) = &self.fixed {
-            let (layout, count) = (self.problem.layout(), constant.len());
+            let (layout, count) = (self.problem.layout(), rows.constant.len());
             let of = |unknown: usize| fixed[unknown];
-            leave_out(own, count, layout.local_range(local).map(of));
-            leave_out(retained, count, layout.retained_range(layout.retained_of(group)).map(of));
-            leave_out(shared, count, layout.shared_columns(group).map(of));
+            leave_out(rows.local, count, layout.local_range(local).map(of));
+            leave_out(rows.retained, count, layout.retained_range(layout.retained_of(group)).map(of));
+            leave_out(rows.shared, count, layout.shared_columns(group).map(of));
+        }
+    }
+
+    /// Reweights equations of unit weight by the loss.
+    #[inline(always)]
+    fn reweigh(&self, rows: &mut GroupRows<'_>) {
+        if let Some(reweighting) = self.reweighting {
+            let GroupRows { constant, local, retained, shared } = rows;
+            reweighting.apply(constant, &mut [&mut **local, &mut **retained, &mut **shared]);
         }
     }
 }
 
 impl GroupRows<'_> {
-    /// Divides the equations of a group by their standard deviations.
+    /// Calls `take` with each row; `first` is the number of the first one.
+    #[inline(always)]
+    fn each(
+        &self,
+        columns: &[usize],
+        first: usize,
+        of: impl Fn(usize) -> EquationOf,
+        take: &mut impl FnMut(&Row<'_>),
+    ) {
+        let rows = self.constant.len();
+        for (row, &constant) in self.constant.iter().enumerate() {
+            let coefficients = [&*self.local, &*self.retained, &*self.shared].map(|part| {
+                let width = part.len() / rows;
+                &part[row * width..][..width]
+            });
+            take(&Row { of: of(row), number: first + row, constant, columns, coefficients });
+        }
+    }
+
+    /// Divides the equations by their standard deviations.
     #[inline(always)]
     pub(crate) fn weigh(&mut self, sd: &[f64]) {
         weigh(sd, self.constant, [&mut *self.local, &mut *self.retained, &mut *self.shared]);

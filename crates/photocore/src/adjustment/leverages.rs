@@ -16,7 +16,7 @@ use super::result::{AdjustError, Adjustment};
 use super::run::{Watch, between};
 use super::walk::Buffers;
 use crate::normals::{
-    Cofactors, FactorOptions, Function, InvertOptions, Layout, LayoutError, Prior, RowCofactors,
+    Cofactors, Equations, FactorOptions, Function, InvertOptions, Layout, LayoutError, RowCofactors,
     SelectedInverse,
 };
 use crate::{Threads, parallel};
@@ -122,12 +122,12 @@ impl Leverages {
         threads: &Threads,
     ) -> Result<Vec<RowCofactors>, AdjustError> {
         let mut asked = self.equations(problem, threads).with_deviations(observation_sd);
-        let mut prior = self.prior(problem);
+        let mut weight = asked.prior().weight.clone();
         if let Some(sd) = included {
             let unknowns = || locals.iter().flat_map(|&local| problem.layout().local_range(local));
             for unknown in unknowns() {
                 let own = sd[unknown];
-                prior.weight[unknown] = if own == 0.0 { 1.0 } else { (own * own).recip() };
+                weight[unknown] = if own == 0.0 { 1.0 } else { (own * own).recip() };
             }
             asked = asked.with_unknowns(unknowns(), sd);
         }
@@ -142,7 +142,7 @@ impl Leverages {
                 None => (of_groups, of_ties),
             };
             formed.extend(ties);
-            problem.system.local_cofactors(&self.selected, (&formed, &prior), &rows, local)
+            problem.system.local_cofactors(&self.selected, (&formed, &weight), &rows, local)
         };
         let found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
         let mut found = found.into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -259,12 +259,12 @@ impl Leverages {
     }
 
     /// Returns the equations at these values.
-    fn equations<'a>(&self, problem: &'a AnyProblem<'a>, threads: &Threads) -> ObservationEquations<'a> {
+    pub(super) fn equations<'a>(
+        &self,
+        problem: &'a AnyProblem<'a>,
+        threads: &Threads,
+    ) -> ObservationEquations<'a> {
         ObservationEquations::new(problem, None, &self.values, &self.held, threads)
-    }
-
-    fn prior(&self, problem: &AnyProblem<'_>) -> Prior {
-        problem.prior_equations(&problem.terms(&self.values), &self.held)
     }
 }
 

@@ -13,8 +13,8 @@ use super::result::{AdjustError, Seconds, gib};
 use super::transformation::Transformation;
 use crate::Threads;
 use crate::normals::{
-    Between, Cofactors, Factor, FactorOptions, Function, Inversion, InvertOptions, Layout, Prior,
-    SelectedInverse, SolveOptions, System,
+    Between, Cofactors, Factor, FactorOptions, Function, Inversion, InvertOptions, Layout, SelectedInverse,
+    SolveOptions, System,
 };
 
 /// Factored normal equations of a problem at given values, in the datum of the constrained unknowns or any other.
@@ -23,8 +23,6 @@ pub struct Linearized {
     pub(super) values: Vec<f64>,
     pub(super) held: Vec<usize>,
     pub(super) reweighting: Option<Reweighting>,
-    #[doc(hidden)]
-    pub prior: Prior,
     /// Factor of the normal equations.
     pub factor: Factor,
     /// Weighted sum of squares of observations and weighted unknowns at these values; not finite if an observation cannot be computed.
@@ -107,17 +105,14 @@ impl Linearized {
         between: Between<'_>,
     ) -> Result<Self, AdjustError> {
         let (start, problem) = (Instant::now(), equations.problem());
-        let terms = problem.terms(&values);
-        let prior = problem.prior_equations(&terms, &held);
-        let factor = problem.system.factor(threads, equations, &prior, options, between)?;
-        let sum_of_squares = factor.sum_of_squares + terms.sum_of_squares(0..values.len());
+        let factor = problem.system.factor(threads, equations, options, between)?;
+        let sum_of_squares = factor.sum_of_squares + equations.terms().sum_of_squares(0..values.len());
         let (took, share) = (start.elapsed().as_secs_f64(), factor.formation_share);
         let seconds = Seconds { form: took * share, factor: took * (1.0 - share), ..Seconds::default() };
         Ok(Self {
             values,
             held,
             reweighting: equations.reweighting(),
-            prior,
             factor,
             sum_of_squares,
             basis: None,
@@ -127,17 +122,16 @@ impl Linearized {
     }
 
     /// A copy of the factor for hypotheses, unless it is large.
-    pub(super) fn small_factor(&self, system: &System, threads: &Threads) -> Option<(Factor, Prior)> {
-        system.copies_factor().then(|| (threads.install(|| self.factor.clone()), self.prior.clone()))
+    pub(super) fn small_factor(&self, system: &System, threads: &Threads) -> Option<Factor> {
+        system.copies_factor().then(|| threads.install(|| self.factor.clone()))
     }
 
     /// A factor at the values of a negligible step later.
-    pub(super) fn of_factor((factor, prior): (Factor, Prior), values: Vec<f64>, held: Vec<usize>) -> Self {
+    pub(super) fn of_factor(factor: Factor, values: Vec<f64>, held: Vec<usize>) -> Self {
         Self {
             values,
             held,
             reweighting: None,
-            prior,
             sum_of_squares: factor.sum_of_squares,
             factor,
             basis: None,
@@ -220,8 +214,7 @@ impl Linearized {
         let system = &problem.system;
         let reduced = {
             let equations = self.equations(problem, threads);
-            let prior = &self.prior;
-            let reduced = system.reduce(threads, &equations, prior, &free, others.as_deref(), between);
+            let reduced = system.reduce(threads, &equations, &free, others.as_deref(), between);
             reduced.map_err(AdjustError::from)?
         };
         let needed = system.memory_of(&reduced);
@@ -292,22 +285,17 @@ impl Linearized {
         threads: &Threads,
         between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
-        let (equations, terms) = (self.equations(problem, threads), problem.terms(&self.values));
+        let equations = self.equations(problem, threads);
         let (height, unknowns) = (problem.equations().max(1), problem.layout().unknowns().max(1));
         let count = columns.len() / height;
-        let mut rights = equations.transposed(threads, count, |row, z| {
+        let rights = equations.transposed(threads, count, |row, z| {
             z.iter_mut().zip(columns.chunks_exact(height)).for_each(|(z, column)| *z = column[row.number]);
-        });
-        equations.each_prior(&terms, 0..problem.sd.len(), |_, row| {
-            for (right, z) in rights.chunks_exact_mut(unknowns).zip(columns.chunks_exact(height)) {
-                row.taken().for_each(|(unknown, value)| right[unknown] += value * z[row.number]);
-            }
         });
         let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
         let solutions = self.solve(&equations, &options, threads, between)?;
         drop(rights);
         let solutions: Vec<&[f64]> = solutions.chunks_exact(unknowns).collect();
-        let changes = equations.times(threads, &terms, &solutions);
+        let changes = equations.times(threads, &solutions);
         for (row, changes) in changes.chunks_exact(count.max(1)).enumerate() {
             for (column, change) in columns.chunks_exact_mut(height).zip(changes) {
                 column[row] -= change;
@@ -332,8 +320,7 @@ impl Linearized {
         threads: &Threads,
         between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
-        let Self { factor, prior, .. } = self;
-        Ok(equations.problem().system.solve(threads, factor, equations, prior, options, between)?)
+        Ok(equations.problem().system.solve(threads, &self.factor, equations, options, between)?)
     }
 
     /// Computes the selected inverse in the requested datum.
@@ -346,10 +333,10 @@ impl Linearized {
         between: Between<'_>,
     ) -> Result<Inverted, AdjustError> {
         let (start, problem) = (Instant::now(), equations.problem());
-        let Self { values, held, prior, factor, transformation, mut seconds, .. } = self;
-        let found = problem.system.invert(threads, factor, equations, &prior, options, between);
+        let Self { values, held, factor, transformation, mut seconds, .. } = self;
+        let found = problem.system.invert(threads, factor, equations, options, between);
         let Inversion { mut cofactors, selected, inversion_share } = found?;
-        let prior_redundancy = problem.finish_cofactors(&mut cofactors, &held, &values);
+        let prior_redundancy = problem.finish_cofactors(&mut cofactors, &held, equations.terms());
         let lost = transformation
             .map(|transformation| threads.install(|| transformation.apply(problem.layout(), &mut cofactors)));
         let took = start.elapsed().as_secs_f64();

@@ -88,7 +88,7 @@ mod traces;
 mod transformation;
 mod walk;
 
-pub use additional::{Additional, AdditionalParameters, Equation, EquationOf, Shared};
+pub use additional::{Additional, AdditionalParameters, Equation, Shared};
 pub use alone::Alone;
 pub use control::step_rules;
 #[doc(hidden)]
@@ -98,6 +98,7 @@ pub use distributions::{
     Tail, chi_square, chi_square_quantile, fisher, fisher_limit, log_chi_square, log_fisher, normal, student,
     student_limit,
 };
+pub use equations::EquationOf;
 #[doc(hidden)]
 pub use equations::ObservationEquations;
 pub use group_test::{Few, GroupTest, VISIBLE, correlation_above, leverage_odds, may_correlate, whitening};
@@ -112,7 +113,7 @@ pub use noncentral::{
 };
 pub use observation_rows::ObservationRows;
 pub use options::{Event, History, Iteration, Method, Options, Phase, Published, Status, Stop};
-pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem, Term};
+pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem};
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Effort, Seconds};
 pub use run::{Requests, Watch, adjust, adjust_with};
@@ -123,7 +124,7 @@ pub use score_parts::{Groups, ScoreParts};
 pub use statistics::median;
 pub use statistics::{Counts, Observed, leading_matrix, standardized};
 pub(crate) use statistics::{middle, weighted};
-pub use terms::Terms;
+pub use terms::{Term, Terms};
 pub use traces::{EquationGroups, GroupSquares, Probing};
 #[doc(hidden)]
 pub use transformation::Transformation;

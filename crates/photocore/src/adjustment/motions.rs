@@ -8,7 +8,7 @@
 
 use faer::{Mat, Side};
 
-use super::equations::{ObservationEquations, Row};
+use super::equations::{EquationOf, ObservationEquations, Row};
 use super::problem::{AnyProblem, Motions};
 use super::walk::Buffers;
 use crate::{Threads, parallel};
@@ -120,28 +120,18 @@ impl<'a> Candidates<'a> {
         self.add_to_row(sums, row);
     }
 
-    /// Adds the rows of a tie, with corrections for the transformation of its misclosure (see [`Evaluated::carried`]).
-    pub fn add_tie(
-        &self,
-        sums: &mut Sums,
-        equations: &ObservationEquations<'_>,
-        buffers: &mut Buffers,
-        tie: usize,
-    ) {
-        let layout = equations.problem().layout();
-        let carried = equations.at().carried(tie);
-        let first = layout.groups() * layout.rows() + layout.tie_rows(tie).start;
-        equations.each_row_of_tie(buffers, tie, |row| {
-            sums.along.fill([0.0; LANES]);
-            if let Some((motion, carried)) = &carried {
-                let along = sums.along.as_flattened_mut()[*motion..].iter_mut();
-                let sd = equations.deviation(row.number);
-                if sd.is_finite() {
-                    along.zip(&carried[row.number - first]).for_each(|(along, by)| *along = by / sd);
-                }
-            }
-            self.add_to_row(sums, row.taken());
-        });
+    /// Adds a row of a tie or prior, with corrections for the transformation of its misclosure (see [`Evaluated::carried`]).
+    pub fn add_other_row(&self, sums: &mut Sums, equations: &ObservationEquations<'_>, row: &Row<'_>) {
+        sums.along.fill([0.0; LANES]);
+        let sd = equations.deviation(row.number);
+        if let EquationOf::Tie { tie, row } = row.of
+            && sd.is_finite()
+            && let Some((motion, carried)) = equations.at().carried(tie)
+        {
+            let along = sums.along.as_flattened_mut()[motion..].iter_mut();
+            along.zip(&carried[row]).for_each(|(along, by)| *along = by / sd);
+        }
+        self.add_to_row(sums, row.taken());
     }
 
     /// Adds a row to the current changes in `sums.along`.
@@ -237,7 +227,7 @@ impl AnyProblem<'_> {
         let stays = |unknown: &usize| released.binary_search(unknown).is_err();
         let fixed: Vec<bool> = (0..values.len()).map(|i| self.sd[i] == 0.0 && stays(&i)).collect();
         let candidates = Candidates::new(motions, &by_unknown, &fixed);
-        let equations = ObservationEquations::of_all(self, values, threads);
+        let equations = ObservationEquations::new(self, None, values, &[], threads).with_fixed_columns();
         let known = self.model.groups_leave_open() && !candidates.move_fixed();
         // A sample represents all local blocks.
         let stride = if known { (layout.locals() / SAMPLE).max(1) } else { 1 };
@@ -256,17 +246,14 @@ impl AnyProblem<'_> {
             .iter()
             .for_each(|part| sums.add(part));
         sums.multiply(stride as f64);
-        let mut buffers = Buffers::default();
-        for tie in 0..layout.ties().len() {
-            candidates.add_tie(&mut sums, &equations, &mut buffers, tie);
-        }
-        for term in
-            self.terms(values).within(0..values.len()).filter(|term| term.unknowns().all(|i| stays(&i)))
-        {
-            for row in term.rows() {
-                candidates.add_row(&mut sums, term.unknowns().zip(row.iter().copied()));
+        let is_released = |row: &Row<'_>| {
+            matches!(row.of, EquationOf::Unknown(_)) && !row.taken().all(|(unknown, _)| stays(&unknown))
+        };
+        equations.each_other_row(false, |row| {
+            if !is_released(row) {
+                candidates.add_other_row(&mut sums, &equations, row);
             }
-        }
+        });
         sums
     }
 }
@@ -325,7 +312,7 @@ impl AnyProblem<'_> {
         let moved = Candidates::by_unknown(&motions, values.len());
         let free = vec![false; values.len()];
         let candidates = Candidates::new(&motions, &moved, &free);
-        let equations = ObservationEquations::of_all(self, values, threads);
+        let equations = ObservationEquations::new(self, None, values, &[], threads).with_fixed_columns();
         let mut sums: Vec<Sums> = (0..classes.count).map(|_| candidates.sums()).collect();
         let mut buffers = Buffers::default();
         if let Some(groups) = sums.first_mut() {
@@ -333,11 +320,13 @@ impl AnyProblem<'_> {
                 equations.each_row(&mut buffers, local, |row| candidates.add_row(groups, row.taken()));
             }
         }
-        for (tie, &class) in classes.of_ties.iter().enumerate() {
-            candidates.add_tie(&mut sums[class], &equations, &mut buffers, tie);
-        }
         let mut observed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();
-        self.terms(values).within(0..values.len()).for_each(|term| observed[term.unknowns()].fill(true));
+        equations.each_other_row(false, |row| match row.of {
+            EquationOf::Tie { tie, .. } => {
+                candidates.add_other_row(&mut sums[classes.of_ties[tie]], &equations, row);
+            }
+            _ => row.taken().for_each(|(unknown, _)| observed[unknown] = true),
+        });
         let mut shares: Vec<f64> = sums.iter().map(|own| own.share(count)).collect();
         for (unknown, &class) in classes.of_unknowns.iter().enumerate() {
             if observed[unknown] && motions.vectors.iter().any(|vector| vector[unknown] != 0.0) {

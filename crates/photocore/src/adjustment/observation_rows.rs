@@ -2,6 +2,7 @@
 
 use super::equations::{ObservationEquations, Row};
 use super::problem::AnyProblem;
+use super::walk::Buffers;
 use crate::{Threads, parallel};
 
 /// Equations a x = l of unit weight: groups and rows first, then ties and rows, then one equation per unknown as an observation of itself,
@@ -21,7 +22,7 @@ impl ObservationRows {
         let add = |found: &mut Self, row: &Row<'_>| found.push(row.taken(), row.constant);
         let mut all = Self::empty();
         equations.fold_rows(threads, Self::empty, add).into_iter().for_each(|part| all.append(part));
-        equations.each_prior(&problem.terms(values), 0..values.len(), |_, row| {
+        equations.each_prior(&mut Buffers::default(), 0..values.len(), |row| {
             all.starts.resize(row.number + 1, all.unknowns.len());
             all.constants.resize(row.number, 0.0);
             add(&mut all, row);
@@ -41,7 +42,7 @@ impl ObservationRows {
     ) -> Vec<f64> {
         let equations = ObservationEquations::new(problem, None, values, held, threads);
         let xs: Vec<&[f64]> = xs.iter().map(Vec::as_slice).collect();
-        equations.times(threads, &problem.terms(values), &xs)
+        equations.times(threads, &xs)
     }
 
     fn empty() -> Self {

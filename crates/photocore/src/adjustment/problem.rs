@@ -1,10 +1,7 @@
 //! Models, and problems: a model with its priors and standard deviations.
 
-use std::ops::Range;
-
-use smallvec::{SmallVec, smallvec};
-
-use crate::normals::{GroupRows, Layout, LayoutError, System, TieRows};
+use super::terms::Terms;
+use crate::normals::{GroupRows, Layout, LayoutError, System};
 
 /// Functional model: computes observations from unknowns.
 pub trait Model: Sync {
@@ -23,10 +20,10 @@ pub trait Model: Sync {
         to.iter().zip(from).map(|(to, from)| to - from).collect()
     }
 
-    /// Returns the prior terms of correlated unknowns, or of unknowns with a special [`Model::advance`], at the given values, ascending.
-    /// `prior` and `sd` are the arrays of the problem. All other weighted unknowns have terms of one unknown.
-    fn terms(&self, _values: &[f64], _prior: &[f64], _sd: &[f64]) -> Vec<Term> {
-        vec![]
+    /// Returns the prior terms of correlated unknowns, or of unknowns with a special [`Model::advance`], at the given values. `prior` and
+    /// `sd` are the arrays of the problem. All other weighted unknowns have terms of one unknown.
+    fn terms(&self, _values: &[f64], _prior: &[f64], _sd: &[f64]) -> Terms {
+        Terms::default()
     }
 
     /// Recomputes the local unknowns from the others; returns false if the model does not support it. Far from the solution this often
@@ -106,8 +103,8 @@ pub trait Evaluated: Send + Sync {
         false
     }
 
-    /// Writes misclosures and partials of a tie. Only called if the layout has ties.
-    fn observe_tie(&self, _tie: usize, _rows: &mut TieRows<'_>) {}
+    /// Writes misclosures and partials of a tie (see [`GroupRows::of_tie`]). Only called if the layout has ties.
+    fn observe_tie(&self, _tie: usize, _rows: &mut GroupRows<'_>) {}
 
     /// Returns ill-conditioned local blocks, and blocks that approach this state. Their information on one retained block exceeds all other
     /// information so far that rounding destroys the latter. Called after every damped step, with the unknowns before it.
@@ -206,35 +203,6 @@ impl AnyProblem<'_> {
         let mut values = unknowns.to_vec();
         self.model.advance(&mut values, step);
         values
-    }
-}
-
-/// Prior of consecutive unknowns of one block: one equation of unit weight per unknown.
-#[derive(Debug, Clone)]
-pub struct Term {
-    /// Index of the first unknown.
-    pub first: usize,
-    /// Observed minus computed, one element per unknown. Stored on the stack, because a photo may have several terms.
-    pub constant: SmallVec<[f64; 3]>,
-    /// Partials of the computed values by the step, square, row by row; zero rows are unobserved.
-    pub coefficients: SmallVec<[f64; 9]>,
-}
-
-impl Term {
-    /// Range of the unknowns.
-    pub fn unknowns(&self) -> Range<usize> {
-        self.first..self.first + self.constant.len()
-    }
-
-    /// Returns the rows of partials.
-    pub fn rows(&self) -> impl Iterator<Item = &[f64]> {
-        self.coefficients.chunks_exact(self.constant.len())
-    }
-
-    /// Creates the term of a single unknown from its difference to the prior.
-    pub(super) fn single(unknown: usize, apart: f64, sd: f64) -> Self {
-        let weight = sd.recip();
-        Self { first: unknown, constant: smallvec![weight * apart], coefficients: smallvec![weight] }
     }
 }
 

@@ -5,9 +5,7 @@ use thiserror::Error;
 use super::options::{Iteration, NEGLIGIBLE, Status};
 use super::statistics::{Counts, Observed, square, standardized};
 use crate::Stopped;
-use crate::normals::{
-    Cofactors, Factor, LayoutError, Operations, Ordering, Prior, SelectedInverse, SystemError,
-};
+use crate::normals::{Cofactors, Factor, LayoutError, Operations, Ordering, SelectedInverse, SystemError};
 
 /// Computing time of each phase in seconds, over all iterations.
 #[derive(Debug, Clone, Copy, Default)]
@@ -76,7 +74,7 @@ pub struct Adjustment {
     /// The inverse from which they were computed, if tests of groups will follow.
     pub(super) selected: Option<SelectedInverse>,
     /// The factor before it was inverted, if tests of groups will follow and it is small.
-    pub(super) factor: Option<(Factor, Prior)>,
+    pub(super) factor: Option<Factor>,
     /// Cofactors of all pairs of the requested unknowns, row by row (see [`super::Requests::by_groups`]).
     pub joint: Option<Vec<f64>>,
     /// Reason for missing cofactors, if they were requested.

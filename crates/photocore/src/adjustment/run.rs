@@ -292,7 +292,8 @@ impl<'a> Run<'a, '_> {
         damping: f64,
     ) -> Result<Iterate<'a>, AdjustError> {
         let reweighting = self.options.loss.map(|loss| Reweighting { loss, curved: self.curved });
-        let equations = ObservationEquations::evaluated(self.problem, at, &self.datum, reweighting);
+        let equations =
+            ObservationEquations::evaluated(self.problem, at, &unknowns, &self.datum, reweighting);
         let held = self.datum.clone();
         let mut linearized = {
             let mut between = between(&mut *self.watch, Phase::Form, self.problem.layout().locals());

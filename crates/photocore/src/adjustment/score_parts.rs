@@ -9,7 +9,8 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::additional::{AT_LEAST, AdditionalParameters, EquationOf, LocalRows, PARTS};
+use super::additional::{AT_LEAST, AdditionalParameters, LocalRows, PARTS};
+use super::equations::EquationOf;
 use super::linearized::Linearized;
 use super::problem::AnyProblem;
 use super::walk::Buffers;

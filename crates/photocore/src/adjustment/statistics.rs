@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use super::loss::Loss;
 use super::problem::{AnyProblem, Evaluated, Problem};
-use super::terms::weighted_among;
+use super::terms::{Terms, weighted_among};
 use crate::Threads;
 use crate::normals::{Cofactors, dot};
 
@@ -87,17 +87,16 @@ impl AnyProblem<'_> {
     }
 
     /// Returns the redundancy number of each unknown as an observation of itself, 1 - a Q a^T for its equation a; zero unless weighted.
-    /// Cofactors of fixed and constrained unknowns, which have unit weight in the normal equations, are set to zero. `values` are the
-    /// linearization point.
+    /// Cofactors of fixed and constrained unknowns, which have unit weight in the normal equations, are set to zero. `terms` are those
+    /// of the linearization point.
     pub(super) fn finish_cofactors(
         &self,
         cofactors: &mut Cofactors,
         held: &[usize],
-        values: &[f64],
+        terms: &Terms,
     ) -> Vec<f64> {
         let (mut redundancy, fixed) = (vec![0.0; self.sd.len()], self.fixed(held));
-        let terms = self.terms(values);
-        let mut terms = terms.within(0..values.len()).peekable();
+        let mut terms = terms.within(0..self.sd.len()).peekable();
         let mut finish = |block: &mut [f64], unknowns: Range<usize>| {
             let width = unknowns.len();
             for (d, unknown) in unknowns.clone().enumerate() {
@@ -144,7 +143,7 @@ impl AnyProblem<'_> {
             for local in locals {
                 for (group, own) in layout.groups_of(local).zip(&mut own) {
                     if !at.misclose(local, group, own) {
-                        let mut rows = buffers.rows(layout, group);
+                        let mut rows = buffers.rows.group(layout, group);
                         at.observe(local, group, &mut rows);
                         own.copy_from_slice(rows.constant);
                     }
@@ -155,7 +154,7 @@ impl AnyProblem<'_> {
         let by_tie = self.for_ties(threads, |buffers, ties| {
             let mut residuals = vec![];
             for tie in ties {
-                let mut rows = buffers.tie.rows(layout, tie);
+                let mut rows = buffers.rows.tie(layout, tie);
                 at.observe_tie(tie, &mut rows);
                 residuals.extend_from_slice(rows.constant);
             }
@@ -176,12 +175,8 @@ impl<M: ?Sized> Problem<M> {
     /// Returns the weighted sum of squares for each group, then for each tie.
     pub(super) fn group_squares(&self, residuals: &[f64]) -> impl Iterator<Item = f64> {
         let layout = self.layout();
-        let (rows, first) = (layout.rows(), layout.groups() * layout.rows());
-        let groups = (0..layout.groups()).map(move |group| group * rows..(group + 1) * rows);
-        let ties = (0..layout.ties().len()).map(move |tie| {
-            let range = layout.tie_rows(tie);
-            first + range.start..first + range.end
-        });
+        let groups = (0..layout.groups()).map(|group| layout.equations_of_group(group));
+        let ties = (0..layout.ties().len()).map(|tie| layout.equations_of_tie(tie));
         groups
             .chain(ties)
             .map(|range| residuals[range.clone()].iter().zip(&self.observation_sd[range]).map(square).sum())

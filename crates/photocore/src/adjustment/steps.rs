@@ -126,7 +126,7 @@ impl<'a> Run<'a, '_> {
         }
         let predicted = match control.always() {
             false => change * change,
-            true => state.equations.decrease(self.threads, &state.linearized.prior, &step),
+            true => state.equations.decrease(self.threads, &step),
         };
         let accelerated = self.accelerated(&state, &step, iteration, predicted, control)?;
         let iteration = accelerated.iteration;

@@ -1,68 +1,107 @@
-//! Priors of a problem as equations of unit weight, in addition to the observation equations.
+//! Priors of a problem as terms of one block, in unit weight.
 
-use std::borrow::Cow;
 use std::ops::Range;
 
-use super::problem::{AnyProblem, Model, Term, is_weighted};
-use crate::normals::Prior;
+use super::problem::{AnyProblem, Model, is_weighted};
 
-/// All prior terms at given values: terms of the model ([`Model::terms`]), and one term per other weighted unknown.
-#[derive(Debug)]
-pub struct Terms<'a> {
-    values: &'a [f64],
-    prior: &'a [f64],
-    sd: &'a [f64],
-    of_model: Vec<Term>,
+/// Prior terms at given values, ascending: terms of the model ([`Model::terms`]), and one term per other weighted unknown.
+#[derive(Debug, Default)]
+pub struct Terms {
+    places: Vec<Place>,
+    constants: Vec<f64>,
+    coefficients: Vec<f64>,
 }
 
-impl<'a> Terms<'a> {
+/// Unknowns of a term, and the indices of its first constant and coefficient.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    first: u32,
+    width: u32,
+    constants: usize,
+    coefficients: usize,
+}
+
+impl Place {
+    fn unknowns(&self) -> Range<usize> {
+        self.first as usize..(self.first + self.width) as usize
+    }
+}
+
+/// Prior of consecutive unknowns of one block: one equation per unknown.
+#[derive(Debug, Clone, Copy)]
+pub struct Term<'a> {
+    /// Index of the first unknown.
+    pub first: usize,
+    /// Observed minus computed, one element per unknown.
+    pub constant: &'a [f64],
+    /// Partials of the computed values by the step, square, row by row; zero rows are unobserved.
+    pub coefficients: &'a [f64],
+}
+
+impl<'a> Term<'a> {
+    /// Range of the unknowns.
+    pub fn unknowns(&self) -> Range<usize> {
+        self.first..self.first + self.constant.len()
+    }
+
+    /// Returns the rows of partials.
+    pub fn rows(&self) -> impl Iterator<Item = &'a [f64]> + use<'a> {
+        self.coefficients.chunks_exact(self.constant.len())
+    }
+}
+
+impl Terms {
     /// Creates the terms at given values; `prior` and `sd` are observed values and standard deviations of the unknowns.
-    pub fn new(model: &dyn Model, values: &'a [f64], prior: &'a [f64], sd: &'a [f64]) -> Self {
-        Self { values, prior, sd, of_model: model.terms(values, prior, sd) }
+    pub fn new(model: &dyn Model, values: &[f64], prior: &[f64], sd: &[f64]) -> Self {
+        let mut all = model.terms(values, prior, sd);
+        all.sort();
+        let of_model: Vec<Range<usize>> = all.places.iter().map(Place::unknowns).collect();
+        let mut of_model = of_model.into_iter().peekable();
+        for unknown in weighted_among(sd, 0..sd.len()) {
+            while of_model.next_if(|own| own.end <= unknown).is_some() {}
+            if of_model.peek().is_none_or(|next| unknown < next.start) {
+                let weight = sd[unknown].recip();
+                all.push(unknown, &[weight * (prior[unknown] - values[unknown])], &[weight]);
+            }
+        }
+        all.sort();
+        all
+    }
+
+    /// Adds a term.
+    pub fn push(&mut self, first: usize, constant: &[f64], coefficients: &[f64]) {
+        let (first, width) = (first as u32, constant.len() as u32);
+        let (constants, all) = (self.constants.len(), self.coefficients.len());
+        self.places.push(Place { first, width, constants, coefficients: all });
+        self.constants.extend_from_slice(constant);
+        self.coefficients.extend_from_slice(coefficients);
+    }
+
+    fn sort(&mut self) {
+        self.places.sort_by_key(|own| own.first);
+    }
+
+    fn term(&self, place: &Place) -> Term<'_> {
+        let width = place.width as usize;
+        Term {
+            first: place.first as usize,
+            constant: &self.constants[place.constants..][..width],
+            coefficients: &self.coefficients[place.coefficients..][..width * width],
+        }
     }
 
     /// Returns the terms whose first unknown is in a range, ascending.
-    pub fn within(&self, of: Range<usize>) -> impl Iterator<Item = Cow<'_, Term>> {
-        let mut of_model = &self.of_model[self.of_model.partition_point(|term| term.first < of.start)..];
-        let end = of.end;
-        let mut apart = weighted_among(self.sd, of).peekable();
-        std::iter::from_fn(move || {
-            let next = of_model.first().filter(|term| term.first < end);
-            let Some(term) = next else {
-                return apart.next().map(|unknown| Cow::Owned(self.single(unknown)));
-            };
-            if let Some(unknown) = apart.next_if(|&unknown| unknown < term.first) {
-                return Some(Cow::Owned(self.single(unknown)));
-            }
-            while apart.next_if(|&unknown| unknown < term.unknowns().end).is_some() {}
-            of_model = &of_model[1..];
-            Some(Cow::Borrowed(term))
-        })
-    }
-
-    /// Calls `take` for each weighted unknown of terms whose first unknown is in a range, ascending, with its row: (unknown, coefficients
-    /// of unknowns, observed minus computed).
-    pub fn rows_within(
-        &self,
-        of: Range<usize>,
-        mut take: impl FnMut(usize, &mut dyn Iterator<Item = (usize, f64)>, f64),
-    ) {
-        for term in self.within(of) {
-            for (k, row) in term.rows().enumerate().filter(|&(k, _)| is_weighted(self.sd[term.first + k])) {
-                take(term.first + k, &mut term.unknowns().zip(row.iter().copied()), term.constant[k]);
-            }
-        }
+    pub fn within(&self, of: Range<usize>) -> impl Iterator<Item = Term<'_>> {
+        let before = |end: usize| self.places.partition_point(|own| (own.first as usize) < end);
+        self.places[before(of.start)..before(of.end)].iter().map(|place| self.term(place))
     }
 
     /// Returns the row of an unknown; empty if it is not weighted.
     pub fn row(&self, unknown: usize) -> (Vec<(usize, f64)>, f64) {
-        if !is_weighted(self.sd[unknown]) {
+        let place = self.places.partition_point(|own| own.unknowns().end <= unknown);
+        let Some(term) = self.places.get(place).map(|own| self.term(own)).filter(|own| own.first <= unknown)
+        else {
             return (vec![], 0.0);
-        }
-        let place = self.of_model.partition_point(|term| term.unknowns().end <= unknown);
-        let term = match self.of_model.get(place).filter(|term| term.first <= unknown) {
-            Some(term) => Cow::Borrowed(term),
-            None => Cow::Owned(self.single(unknown)),
         };
         let k = unknown - term.first;
         let row = term.rows().nth(k).unwrap_or_default();
@@ -72,10 +111,6 @@ impl<'a> Terms<'a> {
     /// Sum of squares of the terms whose first unknown is in a range.
     pub fn sum_of_squares(&self, of: Range<usize>) -> f64 {
         self.within(of).map(|term| term.constant.iter().map(|value| value * value).sum::<f64>()).sum()
-    }
-
-    fn single(&self, unknown: usize) -> Term {
-        Term::single(unknown, self.prior[unknown] - self.values[unknown], self.sd[unknown])
     }
 }
 
@@ -92,31 +127,7 @@ pub(super) fn weighted_among(sd: &[f64], of: Range<usize>) -> impl Iterator<Item
 
 impl AnyProblem<'_> {
     /// Returns the prior terms at given values.
-    pub fn terms<'a>(&'a self, values: &'a [f64]) -> Terms<'a> {
+    pub fn terms(&self, values: &[f64]) -> Terms {
         Terms::new(&self.model, values, &self.prior, &self.sd)
-    }
-
-    /// Forms the normal equations of all terms. A fixed or constrained unknown has the equation x = 0 with unit weight instead of others
-    /// (see [`super::equations`]). Outer unknowns have zero weight here.
-    #[doc(hidden)]
-    pub fn prior_equations(&self, terms: &Terms<'_>, held: &[usize]) -> Prior {
-        let fixed = self.fixed(held);
-        let weight = fixed.iter().map(|&fixed| f64::from(u8::from(fixed))).collect();
-        let mut prior = Prior { weight, right: vec![0.0; fixed.len()], between: vec![] };
-        terms.within(0..fixed.len()).for_each(|term| add_term(&mut prior, &term, &fixed));
-        let layout = self.layout();
-        layout.unknowns_of(layout.outer()).for_each(|unknown| prior.weight[unknown] = 0.0);
-        prior
-    }
-}
-
-/// Adds A^T A and A^T l of a term, except for fixed unknowns.
-fn add_term(prior: &mut Prior, term: &Term, fixed: &[bool]) {
-    for (i, unknown) in term.unknowns().enumerate().filter(|&(_, unknown)| !fixed[unknown]) {
-        let product = |j: usize| term.rows().map(|row| row[i] * row[j]).sum::<f64>();
-        prior.weight[unknown] = product(i);
-        prior.right[unknown] = term.rows().zip(&term.constant).map(|(row, constant)| row[i] * constant).sum();
-        let others = (0..i).filter(|&j| !fixed[term.first + j]);
-        prior.between.extend(others.map(|j| (unknown, term.first + j, product(j))));
     }
 }

@@ -3,37 +3,15 @@
 use std::ops::Range;
 
 use super::problem::AnyProblem;
-use crate::normals::{GroupRows, Layout, TieBuffer};
+use crate::normals::RowBuffer;
 use crate::{Threads, parallel};
 
-/// Buffers for the rows of one group, and of one tie.
-#[derive(Default)]
+/// Memory for the rows of one group or term, and for the unknowns of these rows.
+#[derive(Debug, Default)]
 #[doc(hidden)]
 pub struct Buffers {
-    constant: Vec<f64>,
-    local: Vec<f64>,
-    retained: Vec<f64>,
-    shared: Vec<f64>,
-    pub(super) tie: TieBuffer,
-    /// Buffer for the unknowns of these rows.
-    pub columns: Vec<usize>,
-}
-
-impl Buffers {
-    /// Returns the rows of a group, with undefined contents.
-    pub fn rows(&mut self, layout: &Layout, group: usize) -> GroupRows<'_> {
-        let rows = layout.rows();
-        self.constant.resize(rows, 0.0);
-        self.local.resize(rows * layout.local_dim(), 0.0);
-        self.retained.resize(rows * layout.retained_dim(layout.retained_of(group)), 0.0);
-        self.shared.resize(rows * layout.shared_width(group), 0.0);
-        GroupRows {
-            constant: &mut self.constant,
-            local: &mut self.local,
-            retained: &mut self.retained,
-            shared: &mut self.shared,
-        }
-    }
+    pub(super) rows: RowBuffer,
+    pub(super) columns: Vec<usize>,
 }
 
 /// Number of local blocks or ties in a range, and the mean number of groups per block above which it is reduced.

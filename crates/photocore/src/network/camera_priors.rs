@@ -1,10 +1,9 @@
 //! Prior information of cameras with a full covariance matrix from a separate calibration.
 
 use nalgebra::{DMatrix, DVector};
-use smallvec::SmallVec;
 
 use super::input::Camera;
-use crate::adjustment::Term;
+use crate::adjustment::Terms;
 
 /// Observation of the weighted parameters of a camera.
 #[derive(Debug, Clone)]
@@ -26,19 +25,15 @@ impl CameraPrior {
         Some(Self { first, root })
     }
 
-    /// Returns its equations at given values: L^-1 (p0 - p), S = L L^T.
-    pub fn equations(&self, values: &[f64], prior: &[f64]) -> Term {
+    /// Adds its equations at given values: L^-1 (p0 - p), S = L L^T.
+    pub fn add_to(&self, terms: &mut Terms, values: &[f64], prior: &[f64]) {
         let count = self.root.nrows();
         // Values without prior information may be arbitrary: their column is zero.
         let weighted = |k: usize| self.root.column(k).iter().any(|&value| value != 0.0);
         let apart = DVector::from_fn(count, |k, _| {
             if weighted(k) { prior[self.first + k] - values[self.first + k] } else { 0.0 }
         });
-        Term {
-            first: self.first,
-            constant: SmallVec::from_slice((&self.root * apart).as_slice()),
-            coefficients: SmallVec::from_slice(self.root.transpose().as_slice()),
-        }
+        terms.push(self.first, (&self.root * apart).as_slice(), self.root.transpose().as_slice());
     }
 }
 

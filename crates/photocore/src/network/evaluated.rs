@@ -4,11 +4,11 @@ use super::in_lanes::{FEWEST, Sight, write_in_lanes};
 use super::model::{Bundle, MOTIONS};
 use super::mounts::Composed;
 use super::stations::{Station, Stations, write};
-use crate::adjustment::{Evaluated, Model, Motions, Term};
+use crate::adjustment::{Evaluated, Model, Motions, Terms};
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::camera::{CameraModel, each_camera};
 use crate::geometry::{AttitudeNumbers, Vector3};
-use crate::normals::{GroupRows, TieRows};
+use crate::normals::GroupRows;
 
 /// A bundle at given parameter values.
 pub(super) struct At<'a> {
@@ -27,7 +27,7 @@ impl Bundle {
         each_camera!(camera, camera => write(orientation, camera, point, Some(image.xy), rows));
     }
 
-    pub(super) fn observe_tie(&self, stations: &Stations, tie: usize, rows: &mut TieRows<'_>) {
+    pub(super) fn observe_tie(&self, stations: &Stations, tie: usize, rows: &mut GroupRows<'_>) {
         let Some(observation) = tie.checked_sub(self.tied_images()) else {
             return self.observe_tied_image(stations, self.point_images.start[self.locals] + tie, rows);
         };
@@ -36,7 +36,8 @@ impl Bundle {
         if let Some(linear) = observation.checked_sub(first_linear) {
             return self.linear[linear].write(&stations.coordinates, rows);
         }
-        self.with_tied(stations, |model| own.write(model, rows.constant, rows.coefficients));
+        let coefficients = if rows.local.is_empty() { &mut *rows.shared } else { &mut *rows.local };
+        self.with_tied(stations, |model| own.write(model, rows.constant, coefficients));
     }
 }
 
@@ -75,13 +76,11 @@ impl Model for Bundle {
         step
     }
 
-    fn terms(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Term> {
-        let mut all = self.weighted_angles(values, prior, sd);
-        if !self.camera_priors.is_empty() {
-            all.extend(self.camera_priors.iter().map(|own| own.equations(values, prior)));
-            all.sort_by_key(|own| own.first);
-        }
-        all
+    fn terms(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Terms {
+        let mut terms = Terms::default();
+        self.add_weighted_angles(values, prior, sd, &mut terms);
+        self.camera_priors.iter().for_each(|own| own.add_to(&mut terms, values, prior));
+        terms
     }
 
     /// Intersects the points again.
@@ -176,7 +175,7 @@ impl Evaluated for At<'_> {
         true
     }
 
-    fn observe_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+    fn observe_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
         self.bundle.observe_tie(&self.stations, tie, rows);
     }
 

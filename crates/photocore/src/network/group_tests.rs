@@ -72,7 +72,7 @@ struct Tested<'a> {
     found: &'a Leverages,
     /// Leverages of all groups of equations.
     leverages: &'a [f64],
-    terms: Terms<'a>,
+    terms: Terms,
     alone: Option<Alone>,
 }
 
@@ -233,11 +233,7 @@ impl Trial {
     }
 
     /// Returns the whitened equations of weighted parameters, over all parameters of their block; zero for excluded rows.
-    pub(super) fn term_rows(
-        &self,
-        equations: &[u32],
-        terms: &Terms<'_>,
-    ) -> Result<Vec<Function>, NetworkError> {
+    pub(super) fn term_rows(&self, equations: &[u32], terms: &Terms) -> Result<Vec<Function>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let of = |&equation: &u32| {
             let unknown = equation as usize - problem.layout().equations();
@@ -274,7 +270,7 @@ impl Trial {
 }
 
 /// Returns the misclosure of an equation, divided by its standard deviation.
-pub(super) fn misclosure(equation: u32, observation_sd: &[f64], found: &Leverages, terms: &Terms<'_>) -> f64 {
+pub(super) fn misclosure(equation: u32, observation_sd: &[f64], found: &Leverages, terms: &Terms) -> f64 {
     let equation = equation as usize;
     match equation.checked_sub(observation_sd.len()) {
         None => weighted(found.residuals[equation], observation_sd[equation]),

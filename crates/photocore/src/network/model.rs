@@ -20,7 +20,7 @@ use crate::geometry::{
     self, AttitudeNumbers, Camera, ObjectSpace, Orientation, POSE, PoseNumbers, Refraction, RotationSense,
     Vector3, Vertical,
 };
-use crate::normals::{Cofactors, GroupRows, Tie, TieRows};
+use crate::normals::{Cofactors, GroupRows, Tie};
 use crate::parallel;
 
 /// Model of a network. Local blocks are the points that no observation connects with other objects. Retained blocks are, in this order,
@@ -235,8 +235,8 @@ impl Bundle {
     }
 
     /// Writes the equations of an image observation of a point that is not local.
-    pub(super) fn observe_tied_image(&self, stations: &Stations, image: usize, rows: &mut TieRows<'_>) {
-        let all = rows.coefficients.len() / 2;
+    pub(super) fn observe_tied_image(&self, stations: &Stations, image: usize, rows: &mut GroupRows<'_>) {
+        let all = rows.shared.len() / 2;
         let width = self.of_block(self.main_block(image)).len();
         let shared = all - 3 - width;
         let (mut local, mut retained, mut common) = ([0.0; 6], vec![0.0; 2 * width], vec![0.0; 2 * shared]);
@@ -244,7 +244,7 @@ impl Bundle {
         let mut apart =
             GroupRows { constant, local: &mut local, retained: &mut retained, shared: &mut common };
         self.observe(stations, self.point_of(image), image, &mut apart);
-        for (row, together) in rows.coefficients.chunks_exact_mut(all).enumerate() {
+        for (row, together) in rows.shared.chunks_exact_mut(all).enumerate() {
             together[..3].copy_from_slice(&local[3 * row..][..3]);
             together[3..3 + width].copy_from_slice(&retained[width * row..][..width]);
             together[3 + width..].copy_from_slice(&common[shared * row..][..shared]);

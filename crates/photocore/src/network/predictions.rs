@@ -70,7 +70,7 @@ impl Trial {
         &self,
         groups: &[usize],
         observation_sd: &[f64],
-        terms: &Terms<'_>,
+        terms: &Terms,
         threads: &Threads,
     ) -> Result<Vec<RowCofactors>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
@@ -184,7 +184,7 @@ impl Trial {
     }
 
     /// Returns the equations of observed coordinates of a local point.
-    fn further(&self, place: usize, terms: &Terms<'_>) -> Vec<Function> {
+    fn further(&self, place: usize, terms: &Terms) -> Vec<Function> {
         let mut own = self.on_place(place).iter();
         let control = own.find(|&&group| self.groups.kind(group) == TestKind::Control);
         let rows = control.and_then(|&group| self.term_rows(self.groups.equations_of(group), terms).ok());
@@ -197,7 +197,7 @@ impl Trial {
         place: usize,
         observation_sd: &[f64],
         found: &Leverages,
-        terms: &Terms<'_>,
+        terms: &Terms,
     ) -> (Vec<usize>, Vec<f64>) {
         let groups = self.assembled.problem.layout().groups_of(place);
         let (mut rows, mut off) = (vec![], vec![]);

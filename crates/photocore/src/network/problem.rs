@@ -12,7 +12,7 @@ use super::stations::{Station, Stations};
 use super::surroundings::Surroundings;
 use crate::adjustment::{AnyProblem, Method, Problem, median};
 use crate::geometry::{ObjectSpace, POSE, PoseNumbers};
-use crate::normals::{Layout, System, TieBuffer, TieRows};
+use crate::normals::{Layout, RowBuffer, System};
 use crate::{Threads, parallel};
 
 /// A problem, and the indices of its parts in the network.
@@ -319,20 +319,20 @@ impl Bundle {
         if self.observations.is_empty() {
             return Ok(());
         }
-        let (stations, mut buffer, mut found) = (self.evaluated(initial), TieBuffer::default(), vec![]);
+        let (stations, mut buffer, mut found) = (self.evaluated(initial), RowBuffer::default(), vec![]);
         for (i, own) in self.observations.iter().enumerate() {
             let tie = self.tied_images() + i;
-            let mut rows = buffer.rows(layout, tie);
+            let mut rows = buffer.tie(layout, tie);
             self.observe_tie(&stations, tie, &mut rows);
-            let TieRows { constant, coefficients } = rows;
-            if !constant.iter().chain(&*coefficients).all(|value| value.is_finite()) {
+            let (constant, coefficients) = (&*rows.constant, [&*rows.local, &*rows.shared]);
+            if !constant.iter().chain(coefficients.into_iter().flatten()).all(|value| value.is_finite()) {
                 let (index, kind, fault) = (own.index, own.observation.kind(), Fault::NotFinite);
                 return Err(NetworkError::Observation { index, kind, fault });
             }
             // Heights, planes and lines with fixed parameters, and control are linear in X, Y and Z.
             if let Some(point) = own.local().filter(|_| self.space == ObjectSpace::Rectangular) {
                 let at = stations.coordinates[point];
-                let (constant, coefficients) = ((&*constant).into(), (&*coefficients).into());
+                let (constant, coefficients) = (constant.into(), coefficients[0].into());
                 found.push(Linear { point, at, constant, coefficients });
             }
         }

@@ -267,13 +267,11 @@ fn observations(
     adjustment: &Adjustment,
 ) -> Vec<Option<AdjustedObservation>> {
     let (model, layout) = (&problem.model, problem.layout());
-    let first = layout.groups() * layout.rows();
     let of = |i: usize| {
         let (tied, tie) = (&model.observations[i], model.tied_images() + i);
-        let rows = layout.tie_rows(tie);
         let shares = adjustment.cofactors.as_ref().map(|found| &found.ties[layout.tie_block(tie)]);
         let weight = adjustment.weights.as_ref().map_or(1.0, |all| all[layout.groups() + tie]);
-        let whitened = &adjustment.residuals[first + rows.start..first + rows.end];
+        let whitened = &adjustment.residuals[layout.equations_of_tie(tie)];
         AdjustedObservation::new(tied, whitened, shares, weight)
     };
     let found = parallel::map(model.observations.len(), TOGETHER, of);

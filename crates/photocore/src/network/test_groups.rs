@@ -294,7 +294,7 @@ impl TestGroups {
         order.sort_by_key(|&i| model.observations[i].index);
         for i in order {
             let tied = &model.observations[i];
-            let first = layout.groups() * layout.rows() + layout.tie_rows(model.tied_images() + i).start;
+            let first = layout.equations_of_tie(model.tied_images() + i).start;
             let rows = tied.root.row_iter().enumerate().map(|(k, row)| (first + k, k, row.norm()));
             self.push((TestKind::Observation, tied.index), [NONE; 2], rows);
         }

@@ -320,7 +320,7 @@ impl Trial {
     }
 
     /// Returns the prior terms of the parameters, with given standard deviations.
-    pub(super) fn terms<'a>(&'a self, sd: &'a [f64], values: &'a [f64]) -> Terms<'a> {
+    pub(super) fn terms(&self, sd: &[f64], values: &[f64]) -> Terms {
         let problem = &self.assembled.problem;
         Terms::new(&problem.model, values, &problem.prior, sd)
     }
@@ -329,12 +329,10 @@ impl Trial {
     pub(super) fn equation(&self, equation: u32) -> EquationOf {
         let (problem, equation) = (&self.assembled.problem, equation as usize);
         let (layout, rows) = (problem.layout(), problem.layout().rows());
-        let ties = layout.groups() * rows;
         if let Some(unknown) = equation.checked_sub(layout.equations()) {
             EquationOf::Unknown(unknown)
-        } else if let Some(row) = equation.checked_sub(ties) {
-            let tie = layout.tie_with(row);
-            EquationOf::Tie { tie, row: row - layout.tie_rows(tie).start }
+        } else if let Some(tie) = layout.tie_with(equation) {
+            EquationOf::Tie { tie, row: equation - layout.equations_of_tie(tie).start }
         } else {
             let group = equation / rows;
             EquationOf::Group { group, local: problem.model.point_of(group), row: equation % rows }

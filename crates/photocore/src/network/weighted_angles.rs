@@ -1,10 +1,8 @@
 //! Weighted angles of photos, if the attitude steps by a rotation vector.
 
-use smallvec::SmallVec;
-
 use super::model::Bundle;
 use super::observations::misalignment;
-use crate::adjustment::Term;
+use crate::adjustment::Terms;
 use crate::geometry::{AttitudeNumbers, Matrix3, RotationSense, Vector3};
 
 /// Distance of phi from 90 degrees, in standard deviations, below which angles are treated as an observed rotation.
@@ -14,19 +12,19 @@ const REACH: f64 = 3.0;
 const STEEP: f64 = 0.087;
 
 impl Bundle {
-    /// Returns the equations of weighted angles of photos that step by a rotation vector, at given parameter values.
+    /// Adds the equations of weighted angles of photos that step by a rotation vector, at given parameter values.
     ///
     /// With rho = K d(angles), an angle a, observed as a0 with standard deviation s, has its row of K^-1 / s and the constant (a0 - a) / s.
     /// The sum of squares equals the one for angles as parameters.
-    pub(super) fn weighted_angles(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Vec<Term> {
-        let of_photo = |photo: usize| {
-            let sense = self.turning_sense(photo)?;
+    pub(super) fn add_weighted_angles(&self, values: &[f64], prior: &[f64], sd: &[f64], terms: &mut Terms) {
+        for photo in 0..self.cameras.len() {
+            let Some(sense) = self.turning_sense(photo) else { continue };
             let first = self.of_block(photo).start + 3;
             let three = |all: &[f64]| -> [f64; 3] { std::array::from_fn(|k| all[first + k]) };
             let (angles, observed, sd) = (three(values), three(prior), Vector3::from(three(sd)));
             // A fixed attitude of an excluded photo is not an observation.
             if sd.iter().all(|sd| sd.is_infinite()) || sd.iter().any(|&sd| sd == 0.0) {
-                return None;
+                continue;
             }
             let is_steep = observed[1].cos().abs() < STEEP.max(REACH * sd.max());
             let (constant, coefficients) = if is_steep && sd.iter().all(|sd| sd.is_finite()) {
@@ -34,13 +32,8 @@ impl Bundle {
             } else {
                 angle_equations(sense, angles, observed, &sd)
             };
-            Some(Term {
-                first,
-                constant: SmallVec::from_buf(constant.into()),
-                coefficients: SmallVec::from_slice(coefficients.transpose().as_slice()),
-            })
-        };
-        (0..self.cameras.len()).filter_map(of_photo).collect()
+            terms.push(first, constant.as_slice(), coefficients.transpose().as_slice());
+        }
     }
 }
 

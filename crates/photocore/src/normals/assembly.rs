@@ -1,9 +1,7 @@
 //! Assembly of the front of a supernode: local blocks, ties, contributions of child systems, and priors.
-//!
-//! Equations of a tie, sorted by the columns of their front.
 
 use super::batch::Batch;
-use super::equations::{Equations, Prior, TieRows};
+use super::equations::{Equations, Prior, RowBuffer};
 use super::front::Front;
 use super::incidence::Batches;
 use super::panels::Handover;
@@ -17,7 +15,6 @@ use crate::parallel;
 pub(super) struct Formation<'a> {
     pub system: &'a System,
     pub equations: &'a dyn Equations,
-    pub prior: &'a Prior,
     pub damping: f64,
     /// Whether to cache the local eliminations for [`System::solve`].
     pub caches: bool,
@@ -112,7 +109,7 @@ impl Formation<'_> {
 
     fn fill(&self, batch: &mut Batch, run: &[u32]) {
         batch.gather(self.equations, self.system, run);
-        batch.eliminate(&self.system.layout, self.prior, self.damping);
+        batch.eliminate(&self.system.layout, self.equations.prior(), self.damping);
         self.system.count(run, self.control);
     }
 
@@ -129,12 +126,11 @@ impl Formation<'_> {
 
     /// Adds the ties of a supernode; returns the sum of squares of their right-hand sides.
     pub(super) fn add_ties(&self, front: &mut Front<'_>, index: usize) -> f64 {
-        let mut sum_of_squares = 0.0;
-        let mut tie = TieEquations::default();
-        for &each in self.system.ties.at(index) {
-            tie.gather(self.system, self.equations, index, each as usize);
-            for (coefficients, constant) in tie.rows() {
-                front.add_equation(tie.columns(), coefficients, constant);
+        let (mut sum_of_squares, mut buffer) = (0.0, RowBuffer::default());
+        for &tie in self.system.ties.at(index) {
+            let (columns, rows) = self.system.tie_in_front(index, self.equations, tie as usize, &mut buffer);
+            for (coefficients, constant) in rows {
+                front.add_equation(&columns, &coefficients, constant);
                 sum_of_squares += constant * constant;
             }
         }
@@ -154,15 +150,15 @@ impl Formation<'_> {
     /// Adds the priors and the damping to the eliminated blocks of a supernode.
     pub(super) fn add_prior(&self, front: &mut Front<'_>, index: usize) {
         let (layout, symbolic) = (&self.system.layout, &*self.system.symbolic);
+        let Prior { weight, right, between } = self.equations.prior();
         let positions = symbolic.supernodes()[index].blocks.clone();
         let unknowns = positions.flat_map(|position| symbolic.unknowns_at(layout, position));
         for (column, unknown) in unknowns.enumerate() {
-            let weight = self.prior.weight[unknown];
+            let weight = weight[unknown];
             front.diagonal[column] += weight;
-            front.right[column] += self.prior.right[unknown];
+            front.right[column] += right[unknown];
             front.panel[column * (front.height + 1)] += weight + self.damping * front.diagonal[column];
             front.diagonal[column] *= 1.0 + self.damping;
-            let between = &self.prior.between;
             let own = between.partition_point(|&(i, ..)| i < unknown);
             for &(_, other, weight) in between[own..].iter().take_while(|&&(i, ..)| i == unknown) {
                 front.panel[(column - (unknown - other)) * front.height + column] += weight;
@@ -179,57 +175,29 @@ impl Sums {
     }
 }
 
-/// Equations of one tie, with columns in the order of the front of its assembly node.
-#[derive(Debug, Default)]
-pub(super) struct TieEquations {
-    constant: Vec<f64>,
-    coefficients: Vec<f64>,
-    columns: Vec<usize>,
-    /// Unsorted coefficients, and the sorted index of each column.
-    written: Vec<f64>,
-    order: Vec<usize>,
-}
+/// Ascending columns of a front, and the coefficients with the right-hand side of each equation of a tie.
+pub(super) type TieInFront = (Vec<usize>, Vec<(Vec<f64>, f64)>);
 
-impl TieEquations {
-    /// Gathers the equations of a tie that is assembled in supernode `node`.
-    pub fn gather(&mut self, system: &System, equations: &dyn Equations, node: usize, tie: usize) {
-        let layout = &system.layout;
-        self.place(system, node, tie);
-        let (rows, width) = (layout.ties()[tie].rows, self.columns.len());
-        self.constant.resize(rows, 0.0);
-        self.written.resize(rows * width, 0.0);
-        self.coefficients.resize(rows * width, 0.0);
-        let mut written = TieRows { constant: &mut self.constant, coefficients: &mut self.written };
-        equations.write_tie(tie, &mut written);
-        let rows = self.written.chunks_exact(width).zip(self.coefficients.chunks_exact_mut(width));
-        for (written, sorted) in rows {
-            self.order.iter().zip(written).for_each(|(&to, &value)| sorted[to] = value);
-        }
-    }
-
-    /// Determines the columns in the front.
-    fn place(&mut self, system: &System, node: usize, tie: usize) {
-        let (layout, symbolic) = (&system.layout, &*system.symbolic);
-        let each = &layout.ties()[tie];
-        let mut columns = Vec::new();
-        for &block in &each.retained {
-            let position = symbolic.position(block as usize);
-            let row = symbolic.row_of(node, position);
-            columns.extend(row..row + symbolic.dim(position));
-        }
-        self.columns.clone_from(&columns);
-        self.columns.sort_unstable();
-        self.order.clear();
-        self.order.extend(columns.iter().map(|column| self.columns.partition_point(|other| other < column)));
-    }
-
-    /// Returns the columns of the front, ascending.
-    pub fn columns(&self) -> &[usize] {
-        &self.columns
-    }
-
-    /// Returns coefficients in the order of the columns, and the right-hand side, for each equation.
-    pub fn rows(&self) -> impl Iterator<Item = (&[f64], f64)> {
-        self.coefficients.chunks_exact(self.columns.len()).zip(self.constant.iter().copied())
+impl System {
+    /// Returns the equations of a tie that is assembled in supernode `node`: the columns of the front, ascending, and the coefficients with
+    /// the right-hand side of each equation.
+    pub(super) fn tie_in_front(
+        &self,
+        node: usize,
+        equations: &dyn Equations,
+        tie: usize,
+        buffer: &mut RowBuffer,
+    ) -> TieInFront {
+        let mut rows = buffer.tie(&self.layout, tie);
+        equations.write_tie(tie, &mut rows);
+        let at = self.rows_of(node, &self.layout.ties()[tie].retained);
+        let mut order: Vec<usize> = (0..at.len()).collect();
+        order.sort_unstable_by_key(|&k| at[k]);
+        let sorted = |row: &[f64]| order.iter().map(|&k| row[k]).collect();
+        let found = rows.shared.chunks_exact(at.len()).zip(&*rows.constant);
+        (
+            order.iter().map(|&k| at[k]).collect(),
+            found.map(|(row, &constant)| (sorted(row), constant)).collect(),
+        )
     }
 }

@@ -3,7 +3,7 @@
 //! Chord steps: solutions with an older factor for the right-hand sides at other values.
 
 use super::eliminated::{Elimination, Reduced};
-use super::equations::{Equations, Prior, TieBuffer};
+use super::equations::{Equations, RowBuffer};
 use super::factor::Factor;
 use super::layout::LayoutError;
 use super::system::{System, SystemError};
@@ -67,14 +67,14 @@ impl System {
         &self,
         threads: &Threads,
         factor: &Factor,
-        (equations, prior): (&dyn Equations, &Prior),
+        equations: &dyn Equations,
         rights: &[f64],
         between: Between<'_>,
     ) -> Result<ReducedRights, SystemError> {
-        prior.check(&self.layout)?;
+        equations.prior().check(&self.layout)?;
         self.layout.check_columns("rights", rights.len())?;
         let reduced = watched(threads, between, |control| {
-            let elimination = self.elimination(factor, equations, prior, control);
+            let elimination = self.elimination(factor, equations, control);
             let counts = (self.symbolic.unknowns(), self.symbolic.outer_unknowns());
             let mut others = control.allocated(self.of_others(rights))?;
             let found = elimination.reduce::<LANES>(rights);
@@ -96,16 +96,16 @@ impl System {
         &self,
         threads: &Threads,
         factor: &Factor,
-        (equations, prior): (&dyn Equations, &Prior),
+        equations: &dyn Equations,
         mut reduced: ReducedRights<C>,
         outer: &[f64],
         between: Between<'_>,
     ) -> Result<Vec<f64>, SystemError> {
-        prior.check(&self.layout)?;
+        equations.prior().check(&self.layout)?;
         let required = reduced.products.len().isqrt() * self.symbolic.outer_unknowns();
         LayoutError::unless_of_length("outer", outer.len(), required)?;
         let solved = watched(threads, between, |control| {
-            let elimination = self.elimination(factor, equations, prior, control);
+            let elimination = self.elimination(factor, equations, control);
             reduced.put(outer);
             let ReducedRights { own, mut others, products, .. } = reduced;
             factor.backward_columns(&mut others);
@@ -149,12 +149,13 @@ impl System {
         &self,
         threads: &Threads,
         factor: &Factor,
-        of: (&dyn Equations, &Prior),
+        equations: &dyn Equations,
         between: Between<'_>,
     ) -> Result<Chord, SystemError> {
-        let rights = self.reduce_chord(threads, factor, of, &of.1.right, &mut *between)?;
+        let rights =
+            self.reduce_chord(threads, factor, equations, &equations.prior().right, &mut *between)?;
         let (reduced, decrease) = (rights.reduced(), rights.products[0]);
-        let step = self.solve_reduced_rights(threads, factor, of, rights, &[], between)?;
+        let step = self.solve_reduced_rights(threads, factor, equations, rights, &[], between)?;
         Ok(Chord { step, reduced, decrease })
     }
 
@@ -170,17 +171,17 @@ impl System {
         &self,
         threads: &Threads,
         factor: &Factor,
-        (equations, prior): (&dyn Equations, &Prior),
+        equations: &dyn Equations,
         rights: &[f64],
         between: Between<'_>,
     ) -> Result<ReducedRights<1>, SystemError> {
-        prior.check(&self.layout)?;
+        equations.prior().check(&self.layout)?;
         LayoutError::unless_of_length("rights", rights.len(), self.layout.unknowns())?;
         let reduced = watched(threads, between, |control| {
             let counts = (self.symbolic.unknowns(), self.symbolic.outer_unknowns());
             let mut others = control.allocated(self.of_others(rights))?;
             self.add_rights_of_ties(equations, &mut others);
-            let at_node = |index: usize| self.rights_at_node(equations, prior, index, control);
+            let at_node = |index: usize| self.rights_at_node(equations, index, control);
             let found: Vec<Reduced<1>> = parallel::map_each((0..factor.eliminated.len()).collect(), &at_node);
             // In a fixed order, independent of the threads.
             found.iter().for_each(|found| found.add_to(&mut others, counts.0));
@@ -196,17 +197,11 @@ impl System {
 
     /// Returns the right-hand sides of the local blocks of a supernode, and their contributions to other unknowns. Normal matrices are
     /// formed again from the equations, which is faster than reading the cache of the factor.
-    fn rights_at_node(
-        &self,
-        equations: &dyn Equations,
-        prior: &Prior,
-        index: usize,
-        control: &Control,
-    ) -> Reduced<1> {
+    fn rights_at_node(&self, equations: &dyn Equations, index: usize, control: &Control) -> Reduced<1> {
         let (mut batch, mut found) = (self.workspace.batch(), Reduced::default());
         for run in self.incidence.batches_at(index).iter().take_while(|_| !control.stopped()) {
             batch.gather(equations, self, run);
-            batch.eliminate_from_rights(&self.layout, prior);
+            batch.eliminate_from_rights(&self.layout, equations.prior());
             if !batch.apart {
                 found.own.extend_from_slice(batch.reduced.as_chunks().0);
             }
@@ -222,13 +217,13 @@ impl System {
     /// Adds A^T l of ties of retained blocks to a right-hand side in elimination order.
     fn add_rights_of_ties(&self, equations: &dyn Equations, others: &mut [f64]) {
         let (layout, symbolic) = (&self.layout, &*self.symbolic);
-        let mut buffer = TieBuffer::default();
+        let mut buffer = RowBuffer::default();
         for (index, tie) in layout.ties().iter().enumerate().filter(|(_, tie)| tie.local.is_none()) {
             let of_block = |&block: &u32| symbolic.range(symbolic.position(block as usize));
             let columns: Vec<usize> = tie.retained.iter().flat_map(of_block).collect();
-            let mut written = buffer.rows(layout, index);
+            let mut written = buffer.tie(layout, index);
             equations.write_tie(index, &mut written);
-            for (row, constant) in written.coefficients.chunks_exact(columns.len()).zip(&*written.constant) {
+            for (row, constant) in written.shared.chunks_exact(columns.len()).zip(&*written.constant) {
                 columns.iter().zip(row).for_each(|(&column, a)| others[column] += a * constant);
             }
         }

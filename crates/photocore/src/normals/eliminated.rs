@@ -7,7 +7,7 @@ use pulp::Simd;
 use smallvec::SmallVec;
 
 use super::batch::{Batch, parts_of, unite};
-use super::equations::{Equations, Prior};
+use super::equations::Equations;
 use super::incidence::Batches;
 use super::layout::Layout;
 use super::panels::skip_ref;
@@ -210,7 +210,6 @@ pub(super) struct Elimination<'a> {
     pub system: &'a System,
     pub cached: &'a Eliminated,
     pub equations: &'a dyn Equations,
-    pub prior: &'a Prior,
     pub damping: f64,
     pub control: &'a Control,
 }
@@ -317,7 +316,7 @@ impl Reader<'_> {
 
     /// Returns the elimination of the next batch, with these local blocks.
     fn next(&mut self, locals: &[u32]) -> EliminatedBatch<'_> {
-        let Elimination { system, equations, prior, damping, .. } = *self.elimination;
+        let Elimination { system, equations, damping, .. } = *self.elimination;
         self.coupled.find(system, locals[0]);
         let (coupled, depth) = (&self.coupled, locals.len());
         let numbers = match &mut self.cached {
@@ -328,7 +327,7 @@ impl Reader<'_> {
             }
             None => {
                 self.batch.gather(equations, system, locals);
-                self.batch.eliminate(&system.layout, prior, damping);
+                self.batch.eliminate(&system.layout, equations.prior(), damping);
                 self.batch.eliminated(&system.layout)
             }
         };

@@ -7,7 +7,6 @@ use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 use nalgebra::DMatrix;
 
-use super::equations::Prior;
 use super::functions::Function;
 use super::layout::{Layout, LayoutError};
 use super::panels::SelectedInverse;
@@ -128,19 +127,19 @@ impl System {
     /// observations of a point, are added. Q_oo is the inverse over all coupled blocks, H = N_ll^-1 N_lo and C = B - A H. Then a Q a^T = C
     /// Q_oo C^T + A N_ll^-1 A^T. Q a^T is Q_oo C^T for the others, N_ll^-1 A^T - H Q_oo C^T for the local block.
     ///
-    /// * `formed`, `prior`: all equations of the local block in the inverse, with those of its ties, and the priors;
+    /// * `formed`, `weight`: all equations of the local block in the inverse, with those of its ties, and the prior weights of all unknowns;
     /// * `asked`: equations with requested cofactors, possibly with other weights.
     ///
     /// # Errors
-    /// [`LayoutError::Block`] or [`LayoutError::Length`] if the inverse or the priors belong to another system.
+    /// [`LayoutError::Block`] or [`LayoutError::Length`] if the inverse or the weights belong to another system.
     pub fn local_cofactors(
         &self,
         selected: &SelectedInverse,
-        (formed, prior): (&[Function], &Prior),
+        (formed, weight): (&[Function], &[f64]),
         asked: &[Function],
         local: usize,
     ) -> Result<RowCofactors, LayoutError> {
-        prior.check(&self.layout)?;
+        LayoutError::unless_of_length("weight", weight.len(), self.layout.unknowns())?;
         if self.layout.stands_apart(local) {
             return self.cofactors_apart(selected, asked, local);
         }
@@ -149,7 +148,7 @@ impl System {
         let Own { local: a, others: b } = Own::new(&self.layout, asked, local, &blocks);
         let (rows, dim) = (a.nrows(), a.ncols());
         let mut normal = formed.local.transpose() * &formed.local;
-        self.layout.local_range(local).enumerate().for_each(|(k, i)| normal[(k, k)] += prior.weight[i]);
+        self.layout.local_range(local).enumerate().for_each(|(k, i)| normal[(k, k)] += weight[i]);
         let Ok(factor) = normal.llt(Side::Lower) else {
             return Ok(RowCofactors::unknown(dim, rows, &blocks));
         };

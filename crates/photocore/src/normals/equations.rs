@@ -1,7 +1,7 @@
 //! Observation equations and priors: the input of a formation.
 
 use super::contribution::Contribution;
-use super::layout::{Layout, LayoutError};
+use super::layout::{Layout, LayoutError, Tie};
 
 /// Source of the equations of a system.
 ///
@@ -18,8 +18,11 @@ pub trait Equations: Sync {
         }
     }
 
-    /// Writes the equations of one tie, every element of `rows`. Only called if the layout has ties.
-    fn write_tie(&self, _tie: usize, _rows: &mut TieRows<'_>) {}
+    /// Writes the equations of one tie, every element of `rows` (see [`RowBuffer::tie`]). Only called if the layout has ties.
+    fn write_tie(&self, _tie: usize, _rows: &mut GroupRows<'_>) {}
+
+    /// Returns the prior equations of single unknowns.
+    fn prior(&self) -> &Prior;
 
     /// Returns the contribution of a child system, in the order of the layout. Only called if there are child systems.
     fn contribution(&self, _below: usize) -> Option<&Contribution<'_>> {
@@ -27,33 +30,37 @@ pub trait Equations: Sync {
     }
 }
 
-/// Output rows of one tie.
-#[derive(Debug)]
-pub struct TieRows<'a> {
-    /// Right-hand sides l (rows).
-    pub constant: &'a mut [f64],
-    /// Coefficients, row by row; columns are the unknowns of the tie's blocks, in order.
-    pub coefficients: &'a mut [f64],
-}
-
-/// Equations of one tie, with reused memory.
+/// Memory for the rows of one group or tie.
 #[derive(Debug, Default)]
-pub(crate) struct TieBuffer {
+pub struct RowBuffer {
     constant: Vec<f64>,
-    coefficients: Vec<f64>,
+    coefficients: [Vec<f64>; 3],
 }
 
-impl TieBuffer {
-    /// Returns the rows of a tie, with undefined contents.
-    pub fn rows(&mut self, layout: &Layout, tie: usize) -> TieRows<'_> {
-        let rows = layout.ties()[tie].rows;
+impl RowBuffer {
+    /// Returns the rows of a group, with undefined contents.
+    pub fn group(&mut self, layout: &Layout, group: usize) -> GroupRows<'_> {
+        let main = layout.retained_dim(layout.retained_of(group));
+        self.rows(layout.rows(), [layout.local_dim(), main, layout.shared_width(group)])
+    }
+
+    /// Returns the rows of a tie, with undefined contents: coefficients of its local block, or of all retained blocks as shared ones.
+    pub fn tie(&mut self, layout: &Layout, tie: usize) -> GroupRows<'_> {
+        let Tie { rows, local, retained } = &layout.ties()[tie];
+        let width = layout.unknowns_of(retained).count();
+        self.rows(*rows, [local.map_or(0, |_| layout.local_dim()), 0, width])
+    }
+
+    /// Returns rows with the given numbers of coefficients of the local, the main and the shared blocks.
+    pub(crate) fn rows(&mut self, rows: usize, widths: [usize; 3]) -> GroupRows<'_> {
         self.constant.resize(rows, 0.0);
-        self.coefficients.resize(rows * layout.tie_width(tie), 0.0);
-        TieRows { constant: &mut self.constant, coefficients: &mut self.coefficients }
+        self.coefficients.iter_mut().zip(widths).for_each(|(part, width)| part.resize(rows * width, 0.0));
+        let [local, retained, shared] = &mut self.coefficients;
+        GroupRows { constant: &mut self.constant, local, retained, shared }
     }
 }
 
-/// Output rows of one group of equations. Matrices are stored row by row.
+/// Output rows of one group or tie. Matrices are stored row by row.
 #[derive(Debug)]
 pub struct GroupRows<'a> {
     /// Right-hand sides l (rows).
@@ -67,6 +74,11 @@ pub struct GroupRows<'a> {
 }
 
 impl GroupRows<'_> {
+    /// Returns the coefficients of a tie; columns are the unknowns of its blocks, in order.
+    pub fn of_tie(&mut self) -> &mut [f64] {
+        if self.local.is_empty() { self.shared } else { self.local }
+    }
+
     /// Returns the rows of group `t` of `count` similar groups.
     #[inline(always)]
     pub(crate) fn part(&mut self, t: usize, count: usize) -> GroupRows<'_> {

@@ -8,7 +8,7 @@ use faer::MatMut;
 
 use super::assembly::{Formation, Sums};
 use super::dense::{Pivots, factor_front};
-use super::equations::{Equations, Prior};
+use super::equations::Equations;
 use super::front::Front;
 use super::layout::Layout;
 use super::panels::{Handover, Panels};
@@ -110,15 +110,14 @@ impl System {
         &self,
         threads: &Threads,
         equations: &dyn Equations,
-        prior: &Prior,
         options: &FactorOptions,
         between: Between<'_>,
     ) -> Result<Factor, SystemError> {
-        prior.check(&self.layout)?;
+        equations.prior().check(&self.layout)?;
         let FactorOptions { damping, cached } = *options;
         let factored = watched(threads, between, |control| {
             let caches = cached && self.caches;
-            let formation = Formation { system: self, equations, prior, damping, caches, control };
+            let formation = Formation { system: self, equations, damping, caches, control };
             let (mut given_up, mut passes) = (Vec::new(), 0);
             loop {
                 let factor = formation.factor(&given_up)?;

@@ -11,7 +11,7 @@ use std::collections::HashMap;
 
 use super::batch::Batch;
 use super::eliminated::{Coupled, EliminatedBatch, Reduced as OfLocal};
-use super::equations::{Equations, Prior};
+use super::equations::Equations;
 use super::factor::Factor;
 use super::layout::Layout;
 use super::products::Products;
@@ -51,7 +51,7 @@ const TOGETHER: usize = 16;
 impl System {
     /// Eliminates the local blocks from linear functions.
     ///
-    /// With `columns` None, cofactors of all pairs of `rows` are computed. `equations` and `prior` must belong to the factor; functions
+    /// With `columns` None, cofactors of all pairs of `rows` are computed. `equations` must belong to the factor; functions
     /// must not contain fixed or constrained unknowns.
     ///
     /// # Errors
@@ -60,15 +60,14 @@ impl System {
         &self,
         threads: &Threads,
         equations: &dyn Equations,
-        prior: &Prior,
         rows: &[Function],
         columns: Option<&[Function]>,
         between: Between<'_>,
     ) -> Result<Functions, SystemError> {
-        prior.check(&self.layout)?;
+        equations.prior().check(&self.layout)?;
         let reduced = watched(threads, between, |control| {
             let places = self.symbolic.places(&self.layout);
-            let work = Reduction { system: self, equations, prior, places: &places, control };
+            let work = Reduction { system: self, equations, places: &places, control };
             let rows = work.reduced(rows);
             Some(Functions { rows, columns: columns.map(|columns| work.reduced(columns)) })
         });
@@ -210,7 +209,6 @@ impl Symbolic {
 struct Reduction<'a> {
     system: &'a System,
     equations: &'a dyn Equations,
-    prior: &'a Prior,
     places: &'a [usize],
     control: &'a Control,
 }
@@ -262,7 +260,7 @@ impl Reduction<'_> {
         let (mut batch, mut coupled) = (Batch::default(), Coupled::default());
         let mut at_local = |(local, taken): &(usize, Taken)| {
             batch.gather(self.equations, self.system, &[*local as u32]);
-            batch.eliminate(layout, self.prior, 0.0);
+            batch.eliminate(layout, self.equations.prior(), 0.0);
             self.control.count(1);
             let batch = EliminatedBatch::new(self.system, &mut batch, &mut coupled);
             let of_function = |&(index, mut y): &(usize, [f64; 3])| {

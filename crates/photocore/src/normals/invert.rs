@@ -11,7 +11,7 @@ use faer::{MatMut, MatRef};
 use super::cofactors::{AtNode, Cofactors, leverages_of_groups};
 use super::contribution::{Contribution, packed, unpack};
 use super::dense::invert_front;
-use super::equations::{Equations, Prior};
+use super::equations::Equations;
 use super::factor::Factor;
 use super::layout::LayoutError;
 use super::panels::{Handover, Panels, SelectedInverse};
@@ -44,7 +44,7 @@ pub struct Inversion {
 impl System {
     /// Computes all cofactors.
     ///
-    /// `equations` and `prior` must be those of the factor, and its damping must be zero.
+    /// `equations` must be those of the factor, and its damping must be zero.
     ///
     /// # Errors
     /// Interruption, lack of memory, or lengths that contradict the layout.
@@ -53,11 +53,10 @@ impl System {
         threads: &Threads,
         mut factor: Factor,
         equations: &dyn Equations,
-        prior: &Prior,
         options: &InvertOptions<'_>,
         between: Between<'_>,
     ) -> Result<Inversion, SystemError> {
-        prior.check(&self.layout)?;
+        equations.prior().check(&self.layout)?;
         let outer = packed(self.symbolic.outer_unknowns());
         LayoutError::unless_of_length("InvertOptions::outer", options.outer.len(), outer)?;
         factor.forget();
@@ -65,7 +64,7 @@ impl System {
         watched(threads, between, |control| {
             let information = self.information(&diagonal);
             panels.reopen();
-            Walk { system: self, equations, prior, options, control }.invert(panels, information)
+            Walk { system: self, equations, options, control }.invert(panels, information)
         })?
     }
 
@@ -87,7 +86,6 @@ type Front = Arc<Vec<f64>>;
 struct Walk<'a> {
     system: &'a System,
     equations: &'a dyn Equations,
-    prior: &'a Prior,
     options: &'a InvertOptions<'a>,
     control: &'a Control,
 }
@@ -178,8 +176,8 @@ impl Walk<'_> {
     }
 
     fn at_node(&self, index: usize, front: &[f64], height: usize) -> AtNode {
-        let Self { system, equations, prior, options, control } = *self;
-        AtNode::new(system, index, equations, prior, control, front, height, options.by_groups)
+        let Self { system, equations, options, control } = *self;
+        AtNode::new(system, index, equations, control, front, height, options.by_groups)
     }
 }
 

@@ -130,13 +130,19 @@ mod tests {
         Equations, FactorOptions, GroupRows, InvertOptions, Layout, Ordering, Prior, SelectedInverse,
     };
 
-    struct Irregular;
+    struct Irregular {
+        prior: Prior,
+    }
 
     impl Equations for Irregular {
         fn write(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
             let numbers = rows.local.iter_mut().chain(&mut *rows.retained).enumerate();
             numbers.for_each(|(k, value)| *value = ((7 * local + 3 * group + k) as f64).sin());
             rows.constant.fill(1.0);
+        }
+
+        fn prior(&self) -> &Prior {
+            &self.prior
         }
     }
 
@@ -158,11 +164,11 @@ mod tests {
         let unknowns = system.layout.unknowns();
         let prior = Prior { weight: vec![1.0; unknowns], right: vec![0.0; unknowns], between: vec![] };
         let mut go_on = |_| ControlFlow::Continue(());
+        let equations = Irregular { prior };
         system.release();
-        let factor =
-            system.factor(&threads, &Irregular, &prior, &FactorOptions::UNCACHED, &mut go_on).unwrap();
+        let factor = system.factor(&threads, &equations, &FactorOptions::UNCACHED, &mut go_on).unwrap();
         let options = InvertOptions::default();
-        let inverse = system.invert(&threads, factor, &Irregular, &prior, &options, &mut go_on).unwrap();
+        let inverse = system.invert(&threads, factor, &equations, &options, &mut go_on).unwrap();
         (system.fronts(threads.count()), system.workspace.most(), inverse.selected)
     }
 

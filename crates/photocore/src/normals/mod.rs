@@ -23,11 +23,17 @@
 //! use photocore::normals::{Equations, FactorOptions, GroupRows, Layout, Ordering, Prior, SolveOptions, System};
 //!
 //! /// x_local - y_retained = 1 for every pair.
-//! struct Differences;
+//! struct Differences {
+//!     prior: Prior,
+//! }
 //!
 //! impl Equations for Differences {
 //!     fn write(&self, _local: usize, _group: usize, rows: &mut GroupRows<'_>) {
 //!         (rows.constant[0], rows.local[0], rows.retained[0]) = (1.0, 1.0, -1.0);
+//!     }
+//!
+//!     fn prior(&self) -> &Prior {
+//!         &self.prior
 //!     }
 //! }
 //!
@@ -35,11 +41,12 @@
 //! let layout = Layout::new(1, 1, &[1, 1], vec![0, 2, 4, 6], vec![0, 1, 0, 1, 0, 1])?;
 //! let system = System::new(layout, Ordering::Auto)?;
 //! let prior = Prior { weight: vec![1.0, 0.0, 0.0, 0.0, 0.0], right: vec![0.0; 5], between: vec![] };
+//! let equations = Differences { prior };
 //! let threads = Threads::new(1)?;
 //! let mut go_on = |_| ControlFlow::Continue(());
 //! let (factoring, solving) = (FactorOptions::default(), SolveOptions::default());
-//! let factor = system.factor(&threads, &Differences, &prior, &factoring, &mut go_on)?;
-//! let x = system.solve(&threads, &factor, &Differences, &prior, &solving, &mut go_on)?;
+//! let factor = system.factor(&threads, &equations, &factoring, &mut go_on)?;
+//! let x = system.solve(&threads, &factor, &equations, &solving, &mut go_on)?;
 //! assert!(x.iter().zip([0.0, 0.0, 0.0, -1.0, -1.0]).all(|(x, expected)| (x - expected).abs() < 1e-12));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -83,8 +90,7 @@ pub use contribution::{Contribution, packed};
 pub use deficiency::Deficiency;
 pub use dense::take_product_buffers;
 pub use equation_block::RowCofactors;
-pub(crate) use equations::TieBuffer;
-pub use equations::{Equations, GroupRows, Prior, TieRows};
+pub use equations::{Equations, GroupRows, Prior, RowBuffer};
 pub use factor::{Factor, FactorOptions};
 pub use functions::{Function, Functions};
 pub use graph::Graph;

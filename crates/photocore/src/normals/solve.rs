@@ -8,7 +8,7 @@ use faer::{Accum, MatMut, MatRef, Par};
 use pulp::Simd;
 
 use super::eliminated::Elimination;
-use super::equations::{Equations, Prior};
+use super::equations::Equations;
 use super::factor::Factor;
 use super::layout::{Layout, LayoutError};
 use super::panels::Panels;
@@ -35,7 +35,7 @@ impl System {
     /// Solves the normal equations for all unknowns, in the order of the layout, for one or several right-hand sides; solutions follow one
     /// another. Retained blocks are computed from the factor, then each local block. Bitwise identical for any number of threads.
     ///
-    /// `equations` and `prior` must belong to the factor. Without a cache the equations are evaluated again; for local blocks with zero
+    /// `equations` must belong to the factor. Without a cache the equations are evaluated again; for local blocks with zero
     /// right-hand sides only once.
     ///
     /// # Errors
@@ -45,11 +45,10 @@ impl System {
         threads: &Threads,
         factor: &Factor,
         equations: &dyn Equations,
-        prior: &Prior,
         options: &SolveOptions<'_>,
         between: Between<'_>,
     ) -> Result<Vec<f64>, SystemError> {
-        prior.check(&self.layout)?;
+        equations.prior().check(&self.layout)?;
         match options.rights {
             Some(rights) => self.layout.check_columns("SolveOptions::rights", rights.len())?,
             None => {
@@ -58,7 +57,7 @@ impl System {
             }
         }
         let solved = watched(threads, between, |control| {
-            let elimination = self.elimination(factor, equations, prior, control);
+            let elimination = self.elimination(factor, equations, control);
             match options.rights {
                 None => {
                     let mut others = factor.right.clone();
@@ -81,11 +80,10 @@ impl System {
         &'a self,
         factor: &'a Factor,
         equations: &'a dyn Equations,
-        prior: &'a Prior,
         control: &'a Control,
     ) -> Elimination<'a> {
         let Factor { eliminated: cached, damping, .. } = factor;
-        Elimination { system: self, cached, equations, prior, damping: *damping, control }
+        Elimination { system: self, cached, equations, damping: *damping, control }
     }
 
     /// Returns the rows of retained unknowns in elimination order. `Err`: size of the failed allocation in bytes.

@@ -5,7 +5,7 @@ use photocore::adjustment::{Evaluated, Model};
 use photocore::internal;
 
 use crate::sky::Standard;
-use photocore::normals::{GroupRows, Tie, TieRows};
+use photocore::normals::{GroupRows, Tie};
 
 /// Upper triangular root R of a weight matrix P = R^T R.
 pub type Root = [[f64; 2]; 2];
@@ -320,15 +320,15 @@ impl Evaluated for StarsAt<'_> {
         }
     }
 
-    fn observe_tie(&self, tie: usize, rows: &mut TieRows<'_>) {
+    fn observe_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
         let Self { model, sight } = self;
         let calibration = model.calibration;
         let (tied, Tie { retained, .. }) = &model.ties[tie];
-        rows.coefficients.fill(0.0);
+        rows.shared.fill(0.0);
         match tied {
             Tied::Axis(root) => {
                 let Some(found) = sight.axis(calibration) else { return rows.constant.fill(0.0) };
-                let columns = rows.coefficients.as_chunks_mut::<{ 3 + COMMON }>().0;
+                let columns = rows.shared.as_chunks_mut::<{ 3 + COMMON }>().0;
                 for ((root, constant), columns) in root.iter().zip(&mut *rows.constant).zip(columns) {
                     let mix = |a: f64, b: f64| root[0] * a + root[1] * b;
                     *constant = mix(found.constant[0], found.constant[1]);
@@ -342,7 +342,7 @@ impl Evaluated for StarsAt<'_> {
                     // Every block except the last has three unknowns.
                     let attitude = (parameter / 3).min(calibration.pointings.len());
                     let before = retained.iter().take_while(|&&block| (block as usize) < attitude).count();
-                    rows.coefficients[3 * before + parameter - 3 * attitude] = element;
+                    rows.shared[3 * before + parameter - 3 * attitude] = element;
                 }
             }
         }

@@ -126,7 +126,7 @@ impl Solution {
         }
         if let Some(tie) = model.ties.iter().position(|(tied, _)| matches!(tied, Tied::Axis(_))) {
             let layout = problem.layout();
-            self.axis_test = of_rows(layout.groups() * layout.rows() + layout.tie_rows(tie).start);
+            self.axis_test = of_rows(layout.equations_of_tie(tie).start);
         }
     }
 }

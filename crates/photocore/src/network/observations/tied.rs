@@ -7,7 +7,7 @@ use super::rows::{CommonSite, PhotoSite, PointSite};
 use super::{Observation, Rows, Sites, Touches};
 use crate::geometry::{ObjectSpace, Vector3};
 use crate::network::mounts::Moving;
-use crate::normals::TieRows;
+use crate::normals::GroupRows;
 
 /// An observation of points, photos and shared parameters of a model.
 #[derive(Debug)]
@@ -33,9 +33,9 @@ pub struct Linear {
 
 impl Linear {
     /// Writes the equations at other coordinates of the points.
-    pub fn write(&self, coordinates: &[[f64; 3]], rows: &mut TieRows<'_>) {
+    pub fn write(&self, coordinates: &[[f64; 3]], rows: &mut GroupRows<'_>) {
         let moved: [f64; 3] = std::array::from_fn(|k| coordinates[self.point][k] - self.at[k]);
-        rows.coefficients.copy_from_slice(&self.coefficients);
+        rows.local.copy_from_slice(&self.coefficients);
         let partials = self.coefficients.as_chunks::<3>().0;
         for ((to, constant), row) in rows.constant.iter_mut().zip(&self.constant).zip(partials) {
             *to = constant - (row[0] * moved[0] + row[1] * moved[1] + row[2] * moved[2]);

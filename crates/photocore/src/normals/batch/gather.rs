@@ -3,7 +3,7 @@
 use smallvec::{SmallVec, smallvec};
 
 use super::{Batch, Place, TieSums};
-use crate::normals::equations::{Equations, GroupRows, TieBuffer};
+use crate::normals::equations::{Equations, GroupRows, RowBuffer};
 use crate::normals::layout::Layout;
 use crate::normals::system::System;
 
@@ -13,7 +13,7 @@ impl Batch {
         self.place(system, units);
         self.own.clear();
         if system.layout.has_local_ties() && !self.apart {
-            let mut buffer = TieBuffer::default();
+            let mut buffer = RowBuffer::default();
             let of = |&local: &u32| TieSums::of(equations, &system.layout, local as usize, &mut buffer);
             self.own.extend(self.locals.iter().map(of));
         }
@@ -47,12 +47,12 @@ impl Batch {
 
 impl TieSums {
     /// Forms the normal equations of the ties of a local block.
-    pub fn of(equations: &dyn Equations, layout: &Layout, local: usize, buffer: &mut TieBuffer) -> Self {
+    pub fn of(equations: &dyn Equations, layout: &Layout, local: usize, buffer: &mut RowBuffer) -> Self {
         let mut own = Self::default();
         for &tie in layout.ties_of(local) {
-            let mut rows = buffer.rows(layout, tie as usize);
+            let mut rows = buffer.tie(layout, tie as usize);
             equations.write_tie(tie as usize, &mut rows);
-            for (row, constant) in rows.coefficients.chunks_exact(layout.local_dim()).zip(&*rows.constant) {
+            for (row, constant) in rows.local.chunks_exact(layout.local_dim()).zip(&*rows.constant) {
                 for (a, value) in row.iter().enumerate() {
                     own.right[a] += value * constant;
                     own.normal[a].iter_mut().zip(&row[..=a]).for_each(|(sum, other)| *sum += value * other);

@@ -6,8 +6,7 @@ use std::ops::Range;
 use std::time::Instant;
 
 use self::others::Others;
-use super::assembly::TieEquations;
-use super::equations::{Equations, Prior, TieBuffer};
+use super::equations::{Equations, RowBuffer};
 use super::incidence::Batches;
 use super::layout::Layout;
 use super::system::System;
@@ -54,13 +53,6 @@ impl Cofactors {
         let (rows, l) = (layout.rows(), layout.local_dim());
         let mut local = control.allocated(zeros(layout.locals() * l * l))?;
         let mut leverages = control.allocated(zeros(layout.equations()))?;
-        let (of_groups, of_ties) = leverages.split_at_mut(layout.groups() * rows);
-        let mut ties = control.allocated(zeros(layout.tie_blocks().end))?;
-        let mut put = |tie: usize, values: &[f64]| {
-            ties[layout.tie_block(tie)].copy_from_slice(values);
-            let diagonal = values.iter().step_by(layout.ties()[tie].rows + 1);
-            of_ties[layout.tie_rows(tie)].iter_mut().zip(diagonal).for_each(|(to, &leverage)| *to = leverage);
-        };
         for (index, at_node) in found.iter().enumerate() {
             let mut values = at_node.equations.chunks_exact(rows.max(1));
             let mut blocks = at_node.local.chunks_exact(l * l).peekable();
@@ -71,23 +63,26 @@ impl Cofactors {
                 for (&group, values) in
                     system.incidence.groups_of(layout, unit as usize).iter().zip(&mut values)
                 {
-                    of_groups[group as usize * rows..][..rows].copy_from_slice(values);
+                    leverages[layout.equations_of_group(group as usize)].copy_from_slice(values);
                 }
             }
-            let mut values = &at_node.ties[..];
-            for &tie in system.ties.at(index) {
-                let (own, rest) = values.split_at(layout.tie_block(tie as usize).len());
-                put(tie as usize, own);
+        }
+        let mut ties = control.allocated(zeros(layout.tie_blocks().end))?;
+        let mut put = |order: &mut dyn Iterator<Item = usize>, mut values: &[f64]| {
+            for tie in order {
+                let (own, rest) = values.split_at(layout.tie_block(tie).len());
+                ties[layout.tie_block(tie)].copy_from_slice(own);
+                let diagonal = own.iter().step_by(layout.ties()[tie].rows + 1);
+                let target = leverages[layout.equations_of_tie(tie)].iter_mut();
+                target.zip(diagonal).for_each(|(to, &leverage)| *to = leverage);
                 values = rest;
             }
+        };
+        for (index, at_node) in found.iter().enumerate() {
+            put(&mut system.ties.at(index).iter().map(|&tie| tie as usize), &at_node.ties);
         }
-        let of_locals = leverages_of_local_ties(layout, equations, &local);
-        let mut values = &of_locals[..];
-        for tie in (0..layout.ties().len()).filter(|&tie| layout.ties()[tie].local.is_some()) {
-            let (own, rest) = values.split_at(layout.tie_block(tie).len());
-            put(tie, own);
-            values = rest;
-        }
+        let of_locals = (0..layout.ties().len()).filter(|&tie| layout.ties()[tie].local.is_some());
+        put(&mut { of_locals }, &leverages_of_local_ties(layout, equations, &local));
         Some(Self { local, retained, equations: leverages, ties, pairs, groups: None, information })
     }
 }
@@ -116,7 +111,6 @@ impl AtNode {
         system: &System,
         index: usize,
         equations: &dyn Equations,
-        prior: &Prior,
         control: &Control,
         front: &[f64],
         height: usize,
@@ -130,7 +124,7 @@ impl AtNode {
             let (mut batch, mut part) = (system.workspace.batch(), Self::default());
             for run in batches.iter().take_while(|_| !control.stopped()) {
                 batch.gather(equations, system, run);
-                batch.eliminate(layout, prior, 0.0);
+                batch.eliminate(layout, equations.prior(), 0.0);
                 others.gather(&batch, front, height);
                 others.cofactors(&batch, layout, &mut part);
                 system.count(run, control);
@@ -159,16 +153,16 @@ impl AtNode {
 fn leverages_of_local_ties(layout: &Layout, equations: &dyn Equations, cofactors: &[f64]) -> Vec<f64> {
     let l = layout.local_dim();
     let part = |ties: Range<usize>| {
-        let (mut buffer, mut found) = (TieBuffer::default(), Vec::new());
+        let (mut buffer, mut found) = (RowBuffer::default(), Vec::new());
         for tie in ties {
             let Some(local) = layout.ties()[tie].local else { continue };
             let q = &cofactors[local as usize * l * l..][..l * l];
-            let mut rows = buffer.rows(layout, tie);
+            let mut rows = buffer.tie(layout, tie);
             equations.write_tie(tie, &mut rows);
-            for own in rows.coefficients.chunks_exact(l) {
+            for own in rows.local.chunks_exact(l) {
                 let mut product = [0.0; 3];
                 product.iter_mut().zip(q.chunks_exact(l)).for_each(|(sum, row)| *sum = dot(row, own));
-                found.extend(rows.coefficients.chunks_exact(l).map(|other| dot(&product[..l], other)));
+                found.extend(rows.local.chunks_exact(l).map(|other| dot(&product[..l], other)));
             }
         }
         found
@@ -185,17 +179,16 @@ fn ties_at_node(
     front: &[f64],
     height: usize,
 ) -> Vec<f64> {
-    let (mut tie, mut found) = (TieEquations::default(), Vec::new());
-    for &each in system.ties.at(index) {
-        tie.gather(system, equations, index, each as usize);
-        let columns = tie.columns();
-        for (own, _) in tie.rows() {
+    let (mut buffer, mut found) = (RowBuffer::default(), Vec::new());
+    for &tie in system.ties.at(index) {
+        let (columns, rows) = system.tie_in_front(index, equations, tie as usize, &mut buffer);
+        for (own, _) in &rows {
             // a Q for the columns of the tie.
             let by_column = |&column: &usize| {
                 columns.iter().zip(own).map(|(&row, value)| front[column * height + row] * value).sum::<f64>()
             };
             let product: Vec<f64> = columns.iter().map(by_column).collect();
-            found.extend(tie.rows().map(|(other, _)| dot(&product, other)));
+            found.extend(rows.iter().map(|(other, _)| dot(&product, other)));
         }
     }
     found

@@ -249,14 +249,21 @@ impl Layout {
         &self.ties
     }
 
-    /// Returns the equations of a tie, as a range in the equations of all ties.
-    pub fn tie_rows(&self, tie: usize) -> Range<usize> {
-        self.tie_ptr[tie]..self.tie_ptr[tie + 1]
+    /// Returns the equations of a group.
+    pub fn equations_of_group(&self, group: usize) -> Range<usize> {
+        group * self.rows..(group + 1) * self.rows
     }
 
-    /// Returns the tie of an equation, numbered among the equations of all ties.
-    pub fn tie_with(&self, row: usize) -> usize {
-        self.tie_ptr.partition_point(|&first| first <= row) - 1
+    /// Returns the equations of a tie, which follow those of the groups.
+    pub fn equations_of_tie(&self, tie: usize) -> Range<usize> {
+        let first = self.groups() * self.rows;
+        first + self.tie_ptr[tie]..first + self.tie_ptr[tie + 1]
+    }
+
+    /// Returns the tie of an equation; None for those of groups.
+    pub fn tie_with(&self, equation: usize) -> Option<usize> {
+        let row = equation.checked_sub(self.groups() * self.rows)?;
+        Some(self.tie_ptr.partition_point(|&first| first <= row) - 1)
     }
 
     /// Returns the range of the square matrix of a tie among the matrices of all ties.
@@ -278,13 +285,6 @@ impl Layout {
     pub fn tie_columns(&self, tie: usize) -> impl Iterator<Item = usize> + '_ {
         let Tie { local, retained, .. } = &self.ties[tie];
         local.map_or(0..0, |local| self.local_range(local as usize)).chain(self.unknowns_of(retained))
-    }
-
-    /// Returns the number of columns of a tie.
-    pub(super) fn tie_width(&self, tie: usize) -> usize {
-        let Tie { local, retained, .. } = &self.ties[tie];
-        let of_local = local.map_or(0, |_| self.local_dim);
-        of_local + retained.iter().map(|&block| self.retained_dim(block as usize)).sum::<usize>()
     }
 
     /// Returns the ties of a local block.
