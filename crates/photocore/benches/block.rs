@@ -10,6 +10,7 @@
 use std::fmt::Debug;
 use std::hint::black_box;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
 use faer::linalg::matmul::matmul;
@@ -161,7 +162,7 @@ impl Equations for Linear {
 /// Normal equations of a block.
 struct Phases {
     threads: Threads,
-    system: System,
+    system: Arc<System>,
     equations: Linear,
 }
 
@@ -287,16 +288,15 @@ fn phases(criterion: &mut Criterion) {
     });
     let factor = phases.factor();
     group.bench_function("solve", |bencher| {
-        bencher.iter(|| done(system.solve(threads, &factor, equations, &SolveOptions::default(), &mut go)));
+        bencher.iter(|| done(factor.solve(threads, equations, &SolveOptions::default(), &mut go)));
     });
     // Formation, reduction and factorization are interleaved, front by front, as are selected inverse and cofactors.
     group.throughput(elements(formation + predicted.factor));
     group.bench_function("factor", |bencher| bencher.iter(|| phases.factor()));
     group.throughput(elements(predicted.inverse + cofactors));
     group.bench_function("invert", |bencher| {
-        let invert = |factor: Factor| {
-            done(system.invert(threads, factor, equations, &InvertOptions::default(), &mut go))
-        };
+        let invert =
+            |factor: Factor| done(factor.invert(threads, equations, &InvertOptions::default(), &mut go));
         bencher.iter_batched(|| phases.factor(), invert, BatchSize::PerIteration);
     });
     group.finish();

@@ -5,6 +5,7 @@
 #![allow(clippy::expect_used, missing_docs)]
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
@@ -35,7 +36,7 @@ impl Equations for Anything {
     }
 }
 
-fn system(photos: usize) -> (System, Anything) {
+fn system(photos: usize) -> (Arc<System>, Anything) {
     let retained = (0..POINTS * photos).map(|group| (group % photos) as u32).collect();
     let pointers = (0..=POINTS).map(|point| point * photos).collect();
     let layout = Layout::new(2, 3, &vec![DIM; photos], pointers, retained).expect("a layout");
@@ -47,7 +48,7 @@ fn system(photos: usize) -> (System, Anything) {
 }
 
 /// Returns the time of the factorization without the formation.
-fn factor(threads: &Threads, system: &System, equations: &Anything) -> Duration {
+fn factor(threads: &Threads, system: &Arc<System>, equations: &Anything) -> Duration {
     let start = Instant::now();
     let done =
         system.factor(threads, equations, &FactorOptions::default(), &mut |_| ControlFlow::Continue(()));

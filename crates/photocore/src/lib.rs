@@ -37,7 +37,7 @@
 //!
 //! | quantity | function | reason |
 //! | --- | --- | --- |
-//! | blocks of Q in the pattern of the factor; a Q a^T of each observation | [`normals::System::invert`] | all of them in one traversal |
+//! | blocks of Q in the pattern of the factor; a Q a^T of each observation | [`normals::Factor::invert`] | all of them in one traversal |
 //! | a Q a^T of pairs of equations, also of excluded ones | [`adjustment::Leverages::of_locals`], [`adjustment::Leverages::of_rows`] | from the selected inverse, without a solution |
 //! | Q h over all unknowns | [`adjustment::Linearized::solve_for`] | a vector, not a matrix of functions |
 //! | R z of errors z | [`adjustment::Linearized::project`] | R is not stored |

@@ -268,11 +268,11 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let layout = system.layout();
     let factor = done(system.factor(&threads, dense, &FactorOptions::default(), &mut go));
     assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
-    let solution = done(system.solve(&threads, &factor, dense, &SolveOptions::default(), &mut go));
+    let solution = done(factor.solve(&threads, dense, &SolveOptions::default(), &mut go));
     let rights = vec![1.0; 11 * layout.unknowns()];
     let alone = done(system.factor(&threads, dense, &FactorOptions::UNCACHED, &mut go));
-    let written = done(system.solve(&threads, &alone, dense, &SolveOptions::default(), &mut go));
-    let further = done(system.solve(&threads, &alone, dense, &solved_for(&rights), &mut go));
+    let written = done(alone.solve(&threads, dense, &SolveOptions::default(), &mut go));
+    let further = done(alone.solve(&threads, dense, &solved_for(&rights), &mut go));
     let cholesky = dense.normal_matrix().llt(faer::Side::Lower).unwrap();
     let ones = cholesky.solve(Mat::<f64>::full(layout.unknowns(), 1, 1.0));
     for (i, value) in further.iter().enumerate() {
@@ -286,22 +286,22 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
         assert_close(written[i], *value, 1e-12 * expected.norm_max(), "solution from the equations");
     }
     let right: Vec<f64> = dense.normal_right().col(0).iter().copied().collect();
-    let again = done(system.solve(&threads, &factor, dense, &solved_for(&right), &mut go));
+    let again = done(factor.solve(&threads, dense, &solved_for(&right), &mut go));
     for (value, other) in again.iter().zip(&solution) {
         assert_close(*value, *other, 1e-11 * expected.norm_max(), "solution for its right-hand side");
     }
     if factor.has_cached() {
-        let Chord { step: chord, decrease, .. } = done(system.chord(&threads, &factor, dense, &mut go));
+        let Chord { step: chord, decrease, .. } = done(factor.chord(&threads, dense, &mut go));
         assert_close(decrease, factor.decrease, 1e-11 * factor.decrease, "decrease");
         for (value, other) in chord.iter().zip(&solution) {
             assert_close(*value, *other, 1e-11 * expected.norm_max(), "chord from the same values");
         }
-        compare_chord(dense, &system, &factor);
+        compare_chord(dense, &factor);
     }
     let inverse = cholesky.solve(Mat::<f64>::identity(layout.unknowns(), layout.unknowns()));
     compare_columns(dense, &system, &factor, &inverse);
     compare_functions(dense, &system, &factor, &inverse);
-    let found = done(system.invert(&threads, factor, dense, &InvertOptions::default(), &mut go));
+    let found = done(factor.invert(&threads, dense, &InvertOptions::default(), &mut go));
     let (cofactors, selected) = (found.cofactors, found.selected);
     compare_blocks(layout, &selected, &inverse);
     let l = layout.local_dim();
@@ -325,9 +325,9 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
 
 /// Compares a chord step (modified Newton) with equations of other coefficients. Their own normal matrices L L^T eliminate the local blocks
 /// from the right-hand side; the rest uses the old factor.
-fn compare_chord(dense: &Dense, system: &System, factor: &Factor) {
+fn compare_chord(dense: &Dense, factor: &Factor) {
     let there = Dense::new(dense.layout.clone(), 97);
-    let chord = done(system.chord(&threads(2), factor, &there, &mut go)).step;
+    let chord = done(factor.chord(&threads(2), &there, &mut go)).step;
     let count = dense.layout.locals() * dense.layout.local_dim();
     let (before, after, right) = (dense.normal_matrix(), there.normal_matrix(), there.normal_right());
     let (right, others) = right.split_at_row(count);
@@ -390,7 +390,7 @@ fn compare_columns(dense: &Dense, system: &System, factor: &Factor, inverse: &Ma
         rights[columns.len() * unknowns + column] = 1.0;
     }
     let threads = threads(2);
-    let solved = done(system.solve(&threads, factor, dense, &solved_for(&rights), &mut go));
+    let solved = done(factor.solve(&threads, dense, &solved_for(&rights), &mut go));
     let largest = inverse.norm_max();
     for i in 0..unknowns {
         let mut sum = 0.0;
@@ -422,9 +422,9 @@ fn compare_functions(dense: &Dense, system: &System, factor: &Factor, inverse: &
         (&several, Some(&few)),
         (&several, Some(&vec![])),
     ] {
-        let reduced = done(system.reduce(&threads, dense, rows, columns.map(Vec::as_slice), &mut go));
-        assert!(system.memory_of(&reduced) >= 8 * rows.len() * columns.map_or(rows.len(), Vec::len));
-        let found = done(system.cofactors_of(&threads, factor, &reduced, &mut go));
+        let reduced = done(factor.reduce(&threads, dense, rows, columns.map(Vec::as_slice), &mut go));
+        assert!(factor.memory_of(&reduced) >= 8 * rows.len() * columns.map_or(rows.len(), Vec::len));
+        let found = done(factor.cofactors_of(&threads, &reduced, &mut go));
         let others = columns.unwrap_or(rows);
         assert_eq!(found.len(), rows.len() * others.len());
         let along = |functions: &[Function]| {
@@ -573,8 +573,8 @@ fn equations_of_a_held_local_block_are_functions() {
     let (threads, system) = (threads(2), System::new(dense.layout.clone(), Ordering::Auto).unwrap());
     let factor = done(system.factor(&threads, &dense, &FactorOptions::default(), &mut go));
     let functions = dense.rows_of(7);
-    let reduced = done(system.reduce(&threads, &dense, &functions, None, &mut go));
-    let found = done(system.cofactors_of(&threads, &factor, &reduced, &mut go));
+    let reduced = done(factor.reduce(&threads, &dense, &functions, None, &mut go));
+    let found = done(factor.cofactors_of(&threads, &reduced, &mut go));
     let count = dense.layout.unknowns();
     let inverse =
         dense.normal_matrix().llt(faer::Side::Lower).unwrap().solve(Mat::<f64>::identity(count, count));
@@ -621,7 +621,7 @@ fn what_a_shared_camera_and_photos_leave_open_is_named() {
     let factor = done(system.factor(&threads(2), &dense, &FactorOptions::default(), &mut go));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.blocks(), vec![vec![5, camera]]);
-    assert_eq!(deficiency.unknowns(system.layout()), vec![vec![photo, own]]);
+    assert_eq!(deficiency.unknowns(), vec![vec![photo, own]]);
 }
 
 #[test]
@@ -642,16 +642,15 @@ fn same_bits_of(dense: &Dense) {
         let threads = threads(count);
         let system = System::new(dense.layout.clone(), Ordering::Auto).unwrap();
         let factor = done(system.factor(&threads, dense, &FactorOptions::default(), &mut go));
-        let solution = done(system.solve(&threads, &factor, dense, &SolveOptions::default(), &mut go));
-        let more = done(system.solve(&threads, &factor, dense, &solved_for(&rights), &mut go));
+        let solution = done(factor.solve(&threads, dense, &SolveOptions::default(), &mut go));
+        let more = done(factor.solve(&threads, dense, &solved_for(&rights), &mut go));
         let alone = done(system.factor(&threads, dense, &FactorOptions::UNCACHED, &mut go));
-        let written = done(system.solve(&threads, &alone, dense, &solved_for(&rights), &mut go));
+        let written = done(alone.solve(&threads, dense, &solved_for(&rights), &mut go));
         let functions: Vec<Function> =
             (0..dense.layout.unknowns()).step_by(3).map(|unknown| vec![(unknown, 1.0)]).collect();
-        let reduced = done(system.reduce(&threads, dense, &functions, None, &mut go));
-        let of_functions = done(system.cofactors_of(&threads, &factor, &reduced, &mut go));
-        let cofactors =
-            done(system.invert(&threads, factor, dense, &InvertOptions::default(), &mut go)).cofactors;
+        let reduced = done(factor.reduce(&threads, dense, &functions, None, &mut go));
+        let of_functions = done(factor.cofactors_of(&threads, &reduced, &mut go));
+        let cofactors = done(factor.invert(&threads, dense, &InvertOptions::default(), &mut go)).cofactors;
         let numbers =
             [solution, more, written, of_functions, cofactors.local, cofactors.retained, cofactors.equations];
         numbers.concat().into_iter().map(f64::to_bits).collect::<Vec<u64>>()
@@ -788,19 +787,19 @@ fn slices_of_other_lengths_are_refused() {
     assert_eq!(factor(&short).unwrap_err(), length("Prior::weight", unknowns - 1, unknowns));
     assert_eq!(factor(&long).unwrap_err(), length("Prior::right", unknowns + 1, unknowns));
     let formed = factor(&dense).unwrap();
-    let solve = |of: &Dense, options| system.solve(&threads, &formed, of, &options, &mut go);
+    let solve = |of: &Dense, options| formed.solve(&threads, of, &options, &mut go);
     let refused = solve(&short, SolveOptions::default()).unwrap_err();
     assert_eq!(refused, length("Prior::weight", unknowns - 1, unknowns));
     for count in [1, unknowns - 1, 2 * unknowns + 1] {
         let expected = LayoutError::Columns { field: "SolveOptions::rights", length: count, unknowns };
         let rights = vec![0.0; count];
-        let refused = system.solve(&threads, &formed, &dense, &solved_for(&rights), &mut go);
+        let refused = formed.solve(&threads, &dense, &solved_for(&rights), &mut go);
         assert_eq!(refused.unwrap_err(), SystemError::Layout(expected));
     }
     let outer = SolveOptions { outer: &[0.0], ..SolveOptions::default() };
     assert_eq!(solve(&dense, outer).unwrap_err(), length("SolveOptions::outer", 1, 0));
     let options = InvertOptions::default();
-    let refused = system.invert(&threads, formed, &short, &options, &mut go).unwrap_err();
+    let refused = formed.invert(&threads, &short, &options, &mut go).unwrap_err();
     assert_eq!(refused, length("Prior::weight", unknowns - 1, unknowns));
 }
 
@@ -816,7 +815,7 @@ fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
         let factoring = FactorOptions::default();
         let factor = done(system.factor(&threads(1), &dense, &factoring, &mut go));
         let options = InvertOptions::default();
-        (done(system.invert(&threads(1), factor, &dense, &options, &mut go)), system)
+        (done(factor.invert(&threads(1), &dense, &options, &mut go)), system)
     };
     let (found, _) = inverted(dense.layout.clone());
     let outside = LayoutError::Block { row: 0, column: 19 };
@@ -837,7 +836,7 @@ fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
     let system = System::new(apart.layout.clone(), Ordering::Input).unwrap();
     let factor = done(system.factor(&threads(1), &apart, &FactorOptions::default(), &mut go));
     let options = InvertOptions::default();
-    let foreign = done(system.invert(&threads(1), factor, &apart, &options, &mut go)).selected;
+    let foreign = done(factor.invert(&threads(1), &apart, &options, &mut go)).selected;
     let (_, whole) = inverted(dense.layout.clone());
     let rows = dense.rows_of(0);
     let refused = whole.local_cofactors(&foreign, (&rows, &dense.prior.weight), &rows, 0);

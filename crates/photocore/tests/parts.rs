@@ -5,6 +5,7 @@
 use std::collections::BTreeSet;
 use std::fmt::Debug;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use crate::cut::{Cut, TREES};
 use photocore::Threads;
@@ -174,7 +175,7 @@ fn upward<'a>(
     cut: &Cut,
     ordering: Ordering,
     threads: &Threads,
-) -> Vec<(Piece<'a>, System, Factor)> {
+) -> Vec<(Piece<'a>, Arc<System>, Factor)> {
     let mut left: Vec<Option<Contribution<'static>>> = vec![];
     let mut nodes = vec![];
     for p in 0..cut.parent.len() {
@@ -208,7 +209,7 @@ fn unknowns_of(all: &Piece<'_>, piece: &Piece<'_>) -> Vec<usize> {
 const COLUMNS: usize = 9;
 
 /// Equations, system and factor of each node.
-type Nodes<'a> = Vec<(Piece<'a>, System, Factor)>;
+type Nodes<'a> = Vec<(Piece<'a>, Arc<System>, Factor)>;
 
 /// Returns right-hand sides reduced from the leaves up, and the sum of their products.
 fn reduced(
@@ -232,7 +233,7 @@ fn reduced(
             }
         }
         let of = piece as &dyn Equations;
-        let reduced = done(system.reduce_rights(threads, factor, of, &here, &mut go));
+        let reduced = done(factor.reduce_rights(threads, of, &here, &mut go));
         products.iter_mut().zip(&reduced.products).for_each(|(sum, value)| *sum += value);
         found.push(reduced);
     }
@@ -245,7 +246,7 @@ fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Thre
     let rights: Vec<f64> = (0..COLUMNS * count).map(|i| number(all.seed, i, 17)).collect();
     let factor = done(system.factor(threads, all, &FactorOptions::default(), &mut go));
     let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
-    let expected = done(system.solve(threads, &factor, all, &options, &mut go));
+    let expected = done(factor.solve(threads, all, &options, &mut go));
     let largest = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let nodes = upward(all, cut, ordering, threads);
     let (mut found, products) = reduced(&rights, (all, cut, &nodes), threads);
@@ -259,7 +260,7 @@ fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Thre
         let (own, names) = (system.layout(), unknowns_of(all, &piece));
         let (of, outer) = (&piece as &dyn Equations, std::mem::take(&mut handed[p]));
         let reduced = found.remove(p);
-        let x = done(system.solve_reduced_rights(threads, &factor, of, reduced, &outer, &mut go));
+        let x = done(factor.solve_reduced_rights(threads, of, reduced, &outer, &mut go));
         for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
             let of_column = |column: &[f64]| own.unknowns_of(blocks).map(|at| column[at]).collect::<Vec<_>>();
             handed[child] = x.chunks_exact(names.len().max(1)).flat_map(of_column).collect();
@@ -278,7 +279,7 @@ fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threa
     let factor = done(system.factor(threads, all, &FactorOptions::default(), &mut go));
     assert!(factor.has_cached());
     let of = &elsewhere as &dyn Equations;
-    let Chord { step: expected, decrease, .. } = done(system.chord(threads, &factor, of, &mut go));
+    let Chord { step: expected, decrease, .. } = done(factor.chord(threads, of, &mut go));
     let largest = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let nodes = upward(all, cut, ordering, threads);
     let mut found: Vec<(Piece<'_>, ReducedRights<1>)> = vec![];
@@ -290,7 +291,7 @@ fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threa
             own.unknowns_of(blocks).zip(left).for_each(|(unknown, value)| rights[unknown] += value);
         }
         let of = &piece as &dyn Equations;
-        let reduced = done(system.reduce_chord(threads, factor, of, &rights, &mut go));
+        let reduced = done(factor.reduce_chord(threads, of, &rights, &mut go));
         found.push((piece, reduced));
     }
     let sum: f64 = found.iter().map(|(_, reduced)| reduced.products[0]).sum();
@@ -299,7 +300,7 @@ fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threa
     for (p, (piece, system, factor)) in nodes.into_iter().enumerate().rev() {
         let (own, outer) = (system.layout(), std::mem::take(&mut handed[p]));
         let (of, (_, reduced)) = (&piece as &dyn Equations, found.remove(p));
-        let chord = done(system.solve_reduced_rights(threads, &factor, of, reduced, &outer, &mut go));
+        let chord = done(factor.solve_reduced_rights(threads, of, reduced, &outer, &mut go));
         for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
             handed[child] = own.unknowns_of(blocks).map(|unknown| chord[unknown]).collect();
         }
@@ -316,9 +317,9 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
     let all = whole(layout, seed);
     let system = System::new(all.layout.clone(), ordering).unwrap();
     let factor = done(system.factor(&threads, &all, &FactorOptions::default(), &mut go));
-    let expected = done(system.solve(&threads, &factor, &all, &SolveOptions::default(), &mut go));
+    let expected = done(factor.solve(&threads, &all, &SolveOptions::default(), &mut go));
     let (sum, decrease) = (factor.sum_of_squares, factor.decrease);
-    let cofactors = done(system.invert(&threads, factor, &all, &InvertOptions::default(), &mut go));
+    let cofactors = done(factor.invert(&threads, &all, &InvertOptions::default(), &mut go));
     compare_rights(&all, &cut, ordering, &threads);
     compare_chord(&all, &cut, ordering, &threads);
     let nodes = upward(&all, &cut, ordering, &threads);
@@ -334,9 +335,8 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
     let mut handed: Vec<(Vec<f64>, Vec<f64>)> = vec![Default::default(); nodes.len()];
     for (p, (piece, system, factor)) in nodes.into_iter().enumerate().rev() {
         let (outer_step, outer_cofactors) = std::mem::take(&mut handed[p]);
-        let step = done(system.solve(
+        let step = done(factor.solve(
             &threads,
-            &factor,
             &piece,
             &SolveOptions { outer: &outer_step, ..SolveOptions::default() },
             &mut go,
@@ -345,9 +345,8 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
         for (x, unknown) in step.iter().zip(unknowns_of(&all, &piece)) {
             assert_close(*x, expected[unknown], 1e-9 * largest, "solution");
         }
-        let found = done(system.invert(
+        let found = done(factor.invert(
             &threads,
-            factor,
             &piece,
             &InvertOptions { outer: &outer_cofactors, ..InvertOptions::default() },
             &mut go,

@@ -380,8 +380,7 @@ impl Node {
         self.zero_fixed(formed, &mut rights);
         rights.iter_mut().zip(&equations.prior().right).for_each(|(right, own)| *right += own);
         let mut between = between(watch, Phase::Solve, problem.layout().locals());
-        let factor = &formed.linearized.factor;
-        let reduced = problem.system.reduce_chord(threads, factor, &equations, &rights, &mut between);
+        let reduced = formed.linearized.factor.reduce_chord(threads, &equations, &rights, &mut between);
         let reduced = reduced.map_err(|error| self.named(error.into()))?;
         let found = (reduced.left(), reduced.products[0]);
         formed.reduced = Some(Reduced::Chord(reduced));
@@ -408,8 +407,7 @@ impl Node {
         let problem = self.problem();
         let equations = linearized.equations(problem, threads);
         let mut between = between(watch, Phase::Solve, problem.layout().locals());
-        let reduced =
-            problem.system.reduce_rights(threads, &linearized.factor, &equations, &rights, &mut between);
+        let reduced = linearized.factor.reduce_rights(threads, &equations, &rights, &mut between);
         let reduced = reduced.map_err(|error| self.named(error.into()))?;
         let found = (reduced.left(), reduced.products.clone());
         formed.reduced = Some(Reduced::Datum(reduced));
@@ -439,13 +437,13 @@ impl Node {
         let (linearized, problem) = (&formed.linearized, self.problem());
         let equations = linearized.equations(problem, threads);
         let mut between = between(watch, Phase::Solve, problem.layout().locals());
-        let (system, factor) = (&problem.system, &linearized.factor);
+        let factor = &linearized.factor;
         let found = match formed.reduced.take() {
             Some(Reduced::Chord(reduced)) if reduced.left().len() == outer.len() => {
-                system.solve_reduced_rights(threads, factor, &equations, reduced, outer, &mut between)
+                factor.solve_reduced_rights(threads, &equations, reduced, outer, &mut between)
             }
             Some(Reduced::Datum(reduced)) if reduced.left().len() == outer.len() => {
-                system.solve_reduced_rights(threads, factor, &equations, reduced, outer, &mut between)
+                factor.solve_reduced_rights(threads, &equations, reduced, outer, &mut between)
             }
             _ => return Err(NetworkError::State),
         };

@@ -371,7 +371,7 @@ impl<'a> Run<'a, '_> {
         let (problem, threads) = (self.problem, self.threads);
         let equations = ObservationEquations::new(problem, None, values, &self.datum, threads);
         let mut between = between(&mut *self.watch, Phase::Solve, problem.layout().locals());
-        let chord = problem.system.chord(threads, &state.linearized.factor, &equations, &mut between);
+        let chord = state.linearized.factor.chord(threads, &equations, &mut between);
         Ok((equations, chord?))
     }
 }

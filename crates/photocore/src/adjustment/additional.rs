@@ -438,7 +438,7 @@ impl Linearized {
         // An even number of equal parts, so that two threads have the same work.
         let together = count.div_ceil(count.div_ceil(SOLVED).next_multiple_of(2).max(1));
         let some = columns.as_slice().chunks((columns.nrows() * together).max(1)).collect();
-        let solve = |rights: &[f64]| self.factor.solve_reduced(layout, rights);
+        let solve = |rights: &[f64]| self.factor.solve_reduced(rights);
         let solved = threads.install(|| parallel::map_each(some, &solve)).concat();
         let effects = DMatrix::from_vec(columns.nrows(), count, solved);
         taken += rights * &effects;

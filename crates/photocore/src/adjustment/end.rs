@@ -113,7 +113,7 @@ impl<'a> Run<'a, '_> {
         let failed = if unconfirmed { Status::NotConverged } else { status };
         let Some(step) = self.step(state)? else { return Ok(failed) };
         let (change, factor) = (state.linearized.change(), &state.linearized.factor);
-        let weak = in_valley && factor.largest_share(&self.problem.system, &step) > WEAK * change;
+        let weak = in_valley && factor.largest_share(&step) > WEAK * change;
         let fails = !weak && unconfirmed && change > CONFIRMED;
         if weak || fails {
             self.weak = state.moved(&step);

@@ -66,7 +66,7 @@ impl Leverages {
         let forming = FactorOptions::UNCACHED;
         let formed =
             Linearized::of(&equations, values, held, &forming, threads, &mut between)?.determined()?;
-        let factor = formed.small_factor(&problem.system, threads);
+        let factor = formed.small_factor(threads);
         let inverting = InvertOptions { by_groups: true, ..InvertOptions::default() };
         let found = formed.invert(&equations, &inverting, threads, &mut between)?;
         let Inverted { values, held, cofactors, selected, .. } = found;

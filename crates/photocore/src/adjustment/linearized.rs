@@ -13,8 +13,8 @@ use super::result::{AdjustError, Seconds, gib};
 use super::transformation::Transformation;
 use crate::Threads;
 use crate::normals::{
-    Between, Cofactors, Factor, FactorOptions, Function, Inversion, InvertOptions, Layout, SelectedInverse,
-    SolveOptions, System,
+    Between, Cofactors, Factor, FactorOptions, Function, Inversion, InvertOptions, SelectedInverse,
+    SolveOptions,
 };
 
 /// Factored normal equations of a problem at given values, in the datum of the constrained unknowns or any other.
@@ -122,8 +122,8 @@ impl Linearized {
     }
 
     /// A copy of the factor for hypotheses, unless it is large.
-    pub(super) fn small_factor(&self, system: &System, threads: &Threads) -> Option<Factor> {
-        system.copies_factor().then(|| threads.install(|| self.factor.clone()))
+    pub(super) fn small_factor(&self, threads: &Threads) -> Option<Factor> {
+        self.factor.is_small().then(|| threads.install(|| self.factor.clone()))
     }
 
     /// A factor at the values of a negligible step later.
@@ -178,13 +178,13 @@ impl Linearized {
     }
 
     /// Returns undetermined combinations of retained unknowns: the unknowns in each, ascending.
-    pub fn undetermined_unknowns(&self, layout: &Layout) -> Vec<Vec<usize>> {
-        self.factor.deficiency().map_or(vec![], |found| found.unknowns(layout))
+    pub fn undetermined_unknowns(&self) -> Vec<Vec<usize>> {
+        self.factor.deficiency().map_or(vec![], |found| found.unknowns())
     }
 
     /// Returns undetermined combinations of all unknowns, with components and diagonal elements of the normal equations.
-    pub fn combinations(&self, layout: &Layout) -> Vec<Vec<(usize, f64, f64)>> {
-        self.factor.deficiency().map_or(vec![], |found| found.combinations(layout))
+    pub fn combinations(&self) -> Vec<Vec<(usize, f64, f64)>> {
+        self.factor.deficiency().map_or(vec![], |found| found.combinations())
     }
 
     /// Whether an unknown is neither fixed nor constrained.
@@ -211,17 +211,16 @@ impl Linearized {
             functions.iter().map(|function| self.unmoved(problem, function)).collect()
         };
         let (free, others) = (unmoved(rows), columns.map(unmoved));
-        let system = &problem.system;
         let reduced = {
             let equations = self.equations(problem, threads);
-            let reduced = system.reduce(threads, &equations, &free, others.as_deref(), between);
+            let reduced = self.factor.reduce(threads, &equations, &free, others.as_deref(), between);
             reduced.map_err(AdjustError::from)?
         };
-        let needed = system.memory_of(&reduced);
+        let needed = self.factor.memory_of(&reduced);
         if let Some(available) = memory.filter(|&available| needed > available) {
             return Err(CofactorError::Memory { needed, available });
         }
-        let matrix = system.cofactors_of(threads, &self.factor, &reduced, between);
+        let matrix = self.factor.cofactors_of(threads, &reduced, between);
         let mut matrix = matrix.map_err(AdjustError::from)?;
         if let Some(transformation) = &self.transformation {
             transformation.apply_to_functions(rows, columns, &mut matrix);
@@ -320,7 +319,7 @@ impl Linearized {
         threads: &Threads,
         between: Between<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
-        Ok(equations.problem().system.solve(threads, &self.factor, equations, options, between)?)
+        Ok(self.factor.solve(threads, equations, options, between)?)
     }
 
     /// Computes the selected inverse in the requested datum.
@@ -334,7 +333,7 @@ impl Linearized {
     ) -> Result<Inverted, AdjustError> {
         let (start, problem) = (Instant::now(), equations.problem());
         let Self { values, held, factor, transformation, mut seconds, .. } = self;
-        let found = problem.system.invert(threads, factor, equations, options, between);
+        let found = factor.invert(threads, equations, options, between);
         let Inversion { mut cofactors, selected, inversion_share } = found?;
         let prior_redundancy = problem.finish_cofactors(&mut cofactors, &held, equations.terms());
         let lost = transformation
@@ -368,8 +367,8 @@ impl Linearized {
     }
 
     /// Releases its memory for the next linearization and returns its values.
-    pub(super) fn recycle(self, problem: &AnyProblem<'_>) -> Vec<f64> {
-        self.factor.recycle(&problem.system);
+    pub(super) fn recycle(self) -> Vec<f64> {
+        self.factor.recycle();
         self.values
     }
 }

@@ -1,5 +1,7 @@
 //! Models, and problems: a model with its priors and standard deviations.
 
+use std::sync::Arc;
+
 use super::terms::Terms;
 use crate::normals::{GroupRows, Layout, LayoutError, System};
 
@@ -140,7 +142,7 @@ pub struct Motions {
 #[derive(Debug)]
 pub struct Problem<M: ?Sized> {
     /// The ordered layout.
-    pub system: System,
+    pub system: Arc<System>,
     /// Standard deviation of each observation, in the order of groups and rows, then of ties and rows; infinite for an excluded one.
     pub observation_sd: Vec<f64>,
     /// Initial value of each unknown.

@@ -136,12 +136,12 @@ impl Iterate<'_> {
 
     /// Releases its memory for the next linearization and returns its values.
     pub fn recycle(self) -> Vec<f64> {
-        self.linearized.recycle(self.equations.problem())
+        self.linearized.recycle()
     }
 
     /// Returns the unknowns that a step moves most.
     pub fn moved(&self, step: &[f64]) -> Vec<usize> {
-        self.linearized.factor.moved(&self.equations.problem().system, step)
+        self.linearized.factor.moved(step)
     }
 }
 
@@ -339,8 +339,7 @@ impl<'a> Run<'a, '_> {
                 let mut between = between(&mut *self.watch, Phase::Invert, locals);
                 adjustment.joint = linearized.joint(problem, joint, memory, self.threads, &mut between)?;
             }
-            adjustment.factor =
-                self.requests.by_groups.and_then(|_| linearized.small_factor(&problem.system, self.threads));
+            adjustment.factor = self.requests.by_groups.and_then(|_| linearized.small_factor(self.threads));
             let what =
                 InvertOptions { by_groups: self.requests.by_groups.is_some(), ..InvertOptions::default() };
             let mut between = between(&mut *self.watch, Phase::Invert, locals);

@@ -80,7 +80,7 @@ impl Network {
         let Ok(linearized) = Linearized::form(problem, None, values.to_vec(), held, threads, between) else {
             return error;
         };
-        let named = linearized.combinations(problem.layout());
+        let named = linearized.combinations();
         if named.len() == combinations.len() {
             combinations
                 .iter_mut()

@@ -1,5 +1,7 @@
 //! Assembly of the front of a supernode: local blocks, ties, contributions of child systems, and priors.
 
+use std::sync::Arc;
+
 use super::batch::Batch;
 use super::equations::{Equations, Prior, RowBuffer};
 use super::front::Front;
@@ -13,10 +15,10 @@ use crate::parallel;
 
 /// Input of a formation.
 pub(super) struct Formation<'a> {
-    pub system: &'a System,
+    pub system: &'a Arc<System>,
     pub equations: &'a dyn Equations,
     pub damping: f64,
-    /// Whether to cache the local eliminations for [`System::solve`].
+    /// Whether to cache the local eliminations for [`Factor::solve`](super::Factor::solve).
     pub caches: bool,
     pub control: &'a Control,
 }

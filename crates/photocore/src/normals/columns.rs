@@ -58,31 +58,31 @@ impl<const C: usize> ReducedRights<C> {
     }
 }
 
-impl System {
-    /// Reduces right-hand sides over all unknowns of a part, one after the other, with the arguments as in [`System::solve`].
+impl Factor {
+    /// Reduces right-hand sides over all unknowns of a part, one after the other, with the arguments as in [`Factor::solve`].
     ///
     /// # Errors
     /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn reduce_rights(
         &self,
         threads: &Threads,
-        factor: &Factor,
         equations: &dyn Equations,
         rights: &[f64],
         between: Between<'_>,
     ) -> Result<ReducedRights, SystemError> {
-        equations.prior().check(&self.layout)?;
-        self.layout.check_columns("rights", rights.len())?;
+        let system = &*self.system;
+        equations.prior().check(&system.layout)?;
+        system.layout.check_columns("rights", rights.len())?;
         let reduced = watched(threads, between, |control| {
-            let elimination = self.elimination(factor, equations, control);
-            let counts = (self.symbolic.unknowns(), self.symbolic.outer_unknowns());
-            let mut others = control.allocated(self.of_others(rights))?;
+            let elimination = self.elimination(equations, control);
+            let counts = (system.symbolic.unknowns(), system.symbolic.outer_unknowns());
+            let mut others = control.allocated(system.of_others(rights))?;
             let found = elimination.reduce::<LANES>(rights);
             found.iter().for_each(|found| found.add_to(&mut others, counts.0));
-            factor.forward_columns(&mut others);
+            self.forward_columns(&mut others);
             let own = found.into_iter().map(|found| found.own).collect();
             let mut reduced = ReducedRights { own, others, products: vec![], counts };
-            reduced.products = elimination.products(&reduced, rights.len() / self.layout.unknowns().max(1));
+            reduced.products = elimination.products(&reduced, rights.len() / system.layout.unknowns().max(1));
             Some(reduced)
         });
         Ok(reduced?)
@@ -95,20 +95,20 @@ impl System {
     pub fn solve_reduced_rights<const C: usize>(
         &self,
         threads: &Threads,
-        factor: &Factor,
         equations: &dyn Equations,
         mut reduced: ReducedRights<C>,
         outer: &[f64],
         between: Between<'_>,
     ) -> Result<Vec<f64>, SystemError> {
-        equations.prior().check(&self.layout)?;
-        let required = reduced.products.len().isqrt() * self.symbolic.outer_unknowns();
+        let system = &*self.system;
+        equations.prior().check(&system.layout)?;
+        let required = reduced.products.len().isqrt() * system.symbolic.outer_unknowns();
         LayoutError::unless_of_length("outer", outer.len(), required)?;
         let solved = watched(threads, between, |control| {
-            let elimination = self.elimination(factor, equations, control);
+            let elimination = self.elimination(equations, control);
             reduced.put(outer);
             let ReducedRights { own, mut others, products, .. } = reduced;
-            factor.backward_columns(&mut others);
+            self.backward_columns(&mut others);
             elimination.complete(Some(own), &others, products.len().isqrt())
         });
         Ok(solved?)
@@ -138,30 +138,28 @@ impl Elimination<'_> {
     }
 }
 
-impl System {
+impl Factor {
     /// Computes the chord step for equations and priors at values that differ from the linearization point of the factor.
     ///
-    /// Requires a whole system and a factor with cached local eliminations ([`Factor::has_cached`]).
+    /// Requires a whole system and cached local eliminations ([`Factor::has_cached`]).
     ///
     /// # Errors
     /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn chord(
         &self,
         threads: &Threads,
-        factor: &Factor,
         equations: &dyn Equations,
         between: Between<'_>,
     ) -> Result<Chord, SystemError> {
-        let rights =
-            self.reduce_chord(threads, factor, equations, &equations.prior().right, &mut *between)?;
+        let rights = self.reduce_chord(threads, equations, &equations.prior().right, &mut *between)?;
         let (reduced, decrease) = (rights.reduced(), rights.products[0]);
-        let step = self.solve_reduced_rights(threads, factor, equations, rights, &[], between)?;
+        let step = self.solve_reduced_rights(threads, equations, rights, &[], between)?;
         Ok(Chord { step, reduced, decrease })
     }
 
     /// Reduces the right-hand side A^T l + `rights` of equations and priors at values that differ from the factor's linearization point.
     /// Local blocks are eliminated with the given equations, other unknowns with the factor. Bitwise identical for any number of threads.
-    /// Requires a factor with cached local eliminations.
+    /// Requires cached local eliminations.
     ///
     /// `rights` contains the priors; for a part also the contributions of child systems, and zeros for outer unknowns.
     ///
@@ -170,22 +168,22 @@ impl System {
     pub fn reduce_chord(
         &self,
         threads: &Threads,
-        factor: &Factor,
         equations: &dyn Equations,
         rights: &[f64],
         between: Between<'_>,
     ) -> Result<ReducedRights<1>, SystemError> {
-        equations.prior().check(&self.layout)?;
-        LayoutError::unless_of_length("rights", rights.len(), self.layout.unknowns())?;
+        let system = &*self.system;
+        equations.prior().check(&system.layout)?;
+        LayoutError::unless_of_length("rights", rights.len(), system.layout.unknowns())?;
         let reduced = watched(threads, between, |control| {
-            let counts = (self.symbolic.unknowns(), self.symbolic.outer_unknowns());
-            let mut others = control.allocated(self.of_others(rights))?;
-            self.add_rights_of_ties(equations, &mut others);
-            let at_node = |index: usize| self.rights_at_node(equations, index, control);
-            let found: Vec<Reduced<1>> = parallel::map_each((0..factor.eliminated.len()).collect(), &at_node);
+            let counts = (system.symbolic.unknowns(), system.symbolic.outer_unknowns());
+            let mut others = control.allocated(system.of_others(rights))?;
+            system.add_rights_of_ties(equations, &mut others);
+            let at_node = |index: usize| system.rights_at_node(equations, index, control);
+            let found: Vec<Reduced<1>> = parallel::map_each((0..self.eliminated.len()).collect(), &at_node);
             // In a fixed order, independent of the threads.
             found.iter().for_each(|found| found.add_to(&mut others, counts.0));
-            factor.forward_columns(&mut others);
+            self.forward_columns(&mut others);
             let own: Vec<Vec<[f64; 1]>> = found.into_iter().map(|found| found.own).collect();
             let square = |values: &[f64]| dot(values, values);
             let of_locals = own.iter().map(|own| square(own.as_flattened())).sum::<f64>();
@@ -194,7 +192,9 @@ impl System {
         });
         Ok(reduced?)
     }
+}
 
+impl System {
     /// Returns the right-hand sides of the local blocks of a supernode, and their contributions to other unknowns. Normal matrices are
     /// formed again from the equations, which is faster than reading the cache of the factor.
     fn rights_at_node(&self, equations: &dyn Equations, index: usize, control: &Control) -> Reduced<1> {

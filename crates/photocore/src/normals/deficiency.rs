@@ -1,7 +1,6 @@
 //! Rank defect of the normal equations.
 
 use super::factor::Factor;
-use super::layout::Layout;
 use super::symbolic::Symbolic;
 
 impl Factor {
@@ -28,16 +27,16 @@ impl Deficiency<'_> {
     }
 
     /// Returns the unknowns in each null vector, ascending: shares of at least one tenth of the largest.
-    pub fn unknowns(&self, layout: &Layout) -> Vec<Vec<usize>> {
-        self.each(|vector| self.factor.taking_part(layout, vector))
+    pub fn unknowns(&self) -> Vec<Vec<usize>> {
+        self.each(|vector| self.factor.taking_part(vector))
     }
 
     /// Returns all unknowns of each null vector, as (unknown, component x, diagonal element n of the normal equations). The product x^2 n
     /// is the sum of squares that the unknown's own equations assign to this change.
-    pub fn combinations(&self, layout: &Layout) -> Vec<Vec<(usize, f64, f64)>> {
+    pub fn combinations(&self) -> Vec<Vec<(usize, f64, f64)>> {
         self.each(|vector| {
             let moved = vector.iter().zip(&self.factor.diagonal);
-            self.factor.unknowns(layout).zip(moved).map(|(unknown, (&x, &n))| (unknown, x, n)).collect()
+            self.factor.unknowns().zip(moved).map(|(unknown, (&x, &n))| (unknown, x, n)).collect()
         })
     }
 

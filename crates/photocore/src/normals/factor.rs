@@ -10,7 +10,6 @@ use super::assembly::{Formation, Sums};
 use super::dense::{Pivots, factor_front};
 use super::equations::Equations;
 use super::front::Front;
-use super::layout::Layout;
 use super::panels::{Handover, Panels};
 use super::symbolic::Supernode;
 use super::system::{System, SystemError};
@@ -24,7 +23,7 @@ use crate::parallel::lock;
 pub struct FactorOptions {
     /// Fraction of the diagonal of the normal equations that is added to it.
     pub damping: f64,
-    /// Whether local eliminations are cached for [`System::solve`](super::System::solve), so that equations are not evaluated again.
+    /// Whether local eliminations are cached for [`Factor::solve`], so that equations are not evaluated again.
     /// Ignored if the cache would exceed the memory of the results.
     pub cached: bool,
 }
@@ -43,10 +42,12 @@ impl Default for FactorOptions {
 /// Cholesky factor L of the reduced normal equations.
 #[derive(Debug, Clone)]
 pub struct Factor {
+    /// The system of the factored normal equations.
+    pub(super) system: Arc<System>,
     pub(super) panels: Panels,
     /// L^-1 n, in elimination order; for outer unknowns the reduced right-hand side.
     pub(super) right: Vec<f64>,
-    /// Local eliminations for [`System::solve`]; empty without a cache.
+    /// Local eliminations for [`Factor::solve`]; empty without a cache.
     pub(super) eliminated: Eliminated,
     /// Fraction of the diagonal of the normal equations that was added to it.
     pub damping: f64,
@@ -107,7 +108,7 @@ impl System {
     /// # Errors
     /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn factor(
-        &self,
+        self: &Arc<Self>,
         threads: &Threads,
         equations: &dyn Equations,
         options: &FactorOptions,
@@ -132,7 +133,7 @@ impl System {
                 }
                 // Columns after a lost pivot are invalid, because the pivot was used.
                 given_up.extend(lost);
-                factor.recycle(self);
+                factor.recycle();
             }
         });
         Ok(factored?)
@@ -160,6 +161,7 @@ impl Formation<'_> {
         });
         drop(divided);
         let mut factor = Factor {
+            system: Arc::clone(self.system),
             panels,
             right: Vec::with_capacity(symbolic.unknowns()),
             eliminated: Vec::new(),
@@ -322,23 +324,22 @@ impl Factor {
 
     /// Returns the retained unknowns that a solution moves, ascending: shares of at least one tenth of the largest. Unknowns are scaled by
     /// the precision from their own equations alone.
-    pub fn moved(&self, system: &System, solution: &[f64]) -> Vec<usize> {
-        let unknowns = self.unknowns(&system.layout).map(|unknown| solution[unknown]);
-        self.taking_part(&system.layout, &mut unknowns.collect::<Vec<f64>>())
+    pub fn moved(&self, solution: &[f64]) -> Vec<usize> {
+        self.taking_part(&mut self.unknowns().map(|unknown| solution[unknown]).collect::<Vec<f64>>())
     }
 
     /// Returns the largest share of a retained unknown in a solution, scaled by the precision from its own equations alone.
-    pub fn largest_share(&self, system: &System, solution: &[f64]) -> f64 {
-        let mut shares: Vec<f64> = self.unknowns(&system.layout).map(|unknown| solution[unknown]).collect();
+    pub fn largest_share(&self, solution: &[f64]) -> f64 {
+        let mut shares: Vec<f64> = self.unknowns().map(|unknown| solution[unknown]).collect();
         self.scale(&mut shares);
         shares.iter().fold(0.0, |most, value| value.abs().max(most))
     }
 
     /// Returns the unknowns with large shares in a vector over the retained unknowns in elimination order.
-    pub(super) fn taking_part(&self, layout: &Layout, vector: &mut [f64]) -> Vec<usize> {
+    pub(super) fn taking_part(&self, vector: &mut [f64]) -> Vec<usize> {
         self.scale(vector);
         let largest = vector.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-        let shares = self.unknowns(layout).zip(&*vector);
+        let shares = self.unknowns().zip(&*vector);
         let mut found: Vec<usize> =
             shares.filter(|(_, value)| value.abs() >= 0.1 * largest).map(|(unknown, _)| unknown).collect();
         found.sort_unstable();
@@ -346,14 +347,14 @@ impl Factor {
     }
 
     /// Returns the retained unknowns, in elimination order.
-    pub(super) fn unknowns<'a>(&'a self, layout: &'a Layout) -> impl Iterator<Item = usize> + 'a {
-        let symbolic = &*self.panels.symbolic;
+    pub(super) fn unknowns(&self) -> impl Iterator<Item = usize> + '_ {
+        let System { layout, symbolic, .. } = &*self.system;
         (0..symbolic.blocks()).flat_map(|position| symbolic.unknowns_at(layout, position))
     }
 
     /// Returns the retained unknowns without any equation or prior, ascending.
-    pub fn without_effect(&self, layout: &Layout) -> Vec<usize> {
-        let diagonal = self.unknowns(layout).zip(&self.diagonal);
+    pub fn without_effect(&self) -> Vec<usize> {
+        let diagonal = self.unknowns().zip(&self.diagonal);
         let mut found: Vec<usize> =
             diagonal.filter(|&(_, &n)| n == 0.0).map(|(unknown, _)| unknown).collect();
         found.sort_unstable();
@@ -377,10 +378,15 @@ impl Factor {
         }
     }
 
+    /// Whether it is copied for hypotheses before it is inverted (see [`System::copies_factor`]).
+    pub fn is_small(&self) -> bool {
+        self.system.copies_factor()
+    }
+
     /// Returns its memory to the workspace of the system for reuse.
-    pub fn recycle(self, system: &System) {
-        system.workspace.put_back_panels(self.panels.values);
-        system.workspace.put_back_eliminated(self.eliminated);
+    pub fn recycle(self) {
+        self.system.workspace.put_back_panels(self.panels.values);
+        self.system.workspace.put_back_eliminated(self.eliminated);
     }
 
     /// Returns the doubtful pivots that are rounding errors.

@@ -48,10 +48,10 @@ const FEW: usize = 8;
 /// Number of simultaneous solutions.
 const TOGETHER: usize = 16;
 
-impl System {
+impl Factor {
     /// Eliminates the local blocks from linear functions.
     ///
-    /// With `columns` None, cofactors of all pairs of `rows` are computed. `equations` must belong to the factor; functions
+    /// With `columns` None, cofactors of all pairs of `rows` are computed. `equations` must be those of the factor; functions
     /// must not contain fixed or constrained unknowns.
     ///
     /// # Errors
@@ -64,10 +64,11 @@ impl System {
         columns: Option<&[Function]>,
         between: Between<'_>,
     ) -> Result<Functions, SystemError> {
-        equations.prior().check(&self.layout)?;
+        let system = &*self.system;
+        equations.prior().check(&system.layout)?;
         let reduced = watched(threads, between, |control| {
-            let places = self.symbolic.places(&self.layout);
-            let work = Reduction { system: self, equations, places: &places, control };
+            let places = system.symbolic.places(&system.layout);
+            let work = Reduction { system, equations, places: &places, control };
             let rows = work.reduced(rows);
             Some(Functions { rows, columns: columns.map(|columns| work.reduced(columns)) })
         });
@@ -79,8 +80,8 @@ impl System {
         let (rows, columns) = (functions.rows.len(), functions.columns.as_ref().map_or(0, Vec::len));
         let matrix = rows * if functions.columns.is_some() { columns } else { rows };
         let others = match functions.few() {
-            Some((few, _, _)) => few.len().min(TOGETHER) * self.symbolic.unknowns(),
-            None => Products::new(&self.symbolic, &functions.rights()).numbers(),
+            Some((few, _, _)) => few.len().min(TOGETHER) * self.system.symbolic.unknowns(),
+            None => Products::new(&self.system.symbolic, &functions.rights()).numbers(),
         };
         size_of::<f64>() * (matrix + others)
     }
@@ -92,7 +93,6 @@ impl System {
     pub fn cofactors_of(
         &self,
         threads: &Threads,
-        factor: &Factor,
         functions: &Functions,
         between: Between<'_>,
     ) -> Result<Vec<f64>, Stopped> {
@@ -103,12 +103,12 @@ impl System {
             match functions.few() {
                 Some((few, many, transposed)) => {
                     let mut target = Target { matrix: &mut matrix, width: columns.len(), transposed };
-                    self.solve_few(factor, few, many, &mut target, control)?;
+                    self.solve_few(few, many, &mut target, control)?;
                 }
                 None => {
                     let split = functions.columns.is_some().then_some(rows.len());
-                    let products = Products::new(&self.symbolic, &functions.rights());
-                    products.add(factor, split, &mut matrix, control)?;
+                    let products = Products::new(&self.system.symbolic, &functions.rights());
+                    products.add(self, split, &mut matrix, control)?;
                 }
             }
             add_locals(&mut matrix, rows, columns);
@@ -119,13 +119,12 @@ impl System {
     /// Computes e_f^T N_r^-1 e_g by a complete solution for each of a few functions.
     fn solve_few(
         &self,
-        factor: &Factor,
         few: &[Reduced],
         many: &[Reduced],
         target: &mut Target<'_>,
         control: &Control,
     ) -> Option<()> {
-        let count = self.symbolic.unknowns();
+        let count = self.system.symbolic.unknowns();
         for (batch, functions) in few.chunks(TOGETHER).enumerate() {
             let mut solutions = control.allocated(zeros(functions.len() * count))?;
             for (solution, function) in solutions.chunks_exact_mut(count.max(1)).zip(functions) {
@@ -133,7 +132,7 @@ impl System {
             }
             parallel::each_chunk(&mut solutions, count, &|_, solution| {
                 if !control.stopped() {
-                    factor.solve_columns(solution);
+                    self.solve_columns(solution);
                 }
             });
             for (i, solution) in solutions.chunks_exact(count.max(1)).enumerate() {

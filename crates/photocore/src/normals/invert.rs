@@ -41,7 +41,7 @@ pub struct Inversion {
     pub inversion_share: f64,
 }
 
-impl System {
+impl Factor {
     /// Computes all cofactors.
     ///
     /// `equations` must be those of the factor, and its damping must be zero.
@@ -49,25 +49,26 @@ impl System {
     /// # Errors
     /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn invert(
-        &self,
+        mut self,
         threads: &Threads,
-        mut factor: Factor,
         equations: &dyn Equations,
         options: &InvertOptions<'_>,
         between: Between<'_>,
     ) -> Result<Inversion, SystemError> {
-        equations.prior().check(&self.layout)?;
-        let outer = packed(self.symbolic.outer_unknowns());
+        equations.prior().check(&self.system.layout)?;
+        let outer = packed(self.system.symbolic.outer_unknowns());
         LayoutError::unless_of_length("InvertOptions::outer", options.outer.len(), outer)?;
-        factor.forget();
-        let Factor { mut panels, diagonal, .. } = factor;
+        self.forget();
+        let Self { system, mut panels, diagonal, .. } = self;
         watched(threads, between, |control| {
-            let information = self.information(&diagonal);
+            let information = system.information(&diagonal);
             panels.reopen();
-            Walk { system: self, equations, options, control }.invert(panels, information)
+            Walk { system: &system, equations, options, control }.invert(panels, information)
         })?
     }
+}
 
+impl System {
     /// Converts the initial diagonal of the normal equations from elimination order to the order of the retained blocks in the layout.
     fn information(&self, diagonal: &[f64]) -> Vec<f64> {
         let retained = self.layout.all_retained();

@@ -121,6 +121,7 @@ mod tests {
     #![allow(clippy::unwrap_used)]
 
     use std::ops::ControlFlow;
+    use std::sync::Arc;
 
     use proptest::prelude::*;
 
@@ -147,7 +148,7 @@ mod tests {
     }
 
     /// Returns a system whose local blocks have observations with some of `count` retained blocks.
-    fn system(count: usize, locals: &[Vec<usize>]) -> System {
+    fn system(count: usize, locals: &[Vec<usize>]) -> Arc<System> {
         let ends = locals.iter().scan(0, |end, blocks| {
             *end += blocks.len();
             Some(*end)
@@ -159,7 +160,7 @@ mod tests {
     }
 
     /// Returns the predicted and the counted number of elements in fronts, and the selected inverse.
-    fn fronts(system: &System, threads: usize) -> (usize, usize, SelectedInverse) {
+    fn fronts(system: &Arc<System>, threads: usize) -> (usize, usize, SelectedInverse) {
         let threads = Threads::new(threads).unwrap();
         let unknowns = system.layout.unknowns();
         let prior = Prior { weight: vec![1.0; unknowns], right: vec![0.0; unknowns], between: vec![] };
@@ -168,12 +169,12 @@ mod tests {
         system.release();
         let factor = system.factor(&threads, &equations, &FactorOptions::UNCACHED, &mut go_on).unwrap();
         let options = InvertOptions::default();
-        let inverse = system.invert(&threads, factor, &equations, &options, &mut go_on).unwrap();
+        let inverse = factor.invert(&threads, &equations, &options, &mut go_on).unwrap();
         (system.fronts(threads.count()), system.workspace.most(), inverse.selected)
     }
 
     /// Checks the prediction for several numbers of threads, and that they compute the same bits.
-    fn check(system: &System) {
+    fn check(system: &Arc<System>) {
         let (predicted, counted, serial) = fronts(system, 1);
         assert!(counted <= predicted && 2 * predicted <= 3 * counted, "{predicted}, counted {counted}");
         for threads in [2, 3, 8] {

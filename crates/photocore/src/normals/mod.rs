@@ -8,8 +8,8 @@
 //! 2. [`System`]: the elimination order and the pattern of the factor ([`Symbolic`]), computed once for all iterations;
 //! 3. [`System::factor`]: formation of the normal equations, elimination of the local blocks (Schur complement) and block Cholesky
 //!    factorisation on dense panels, front by front;
-//! 4. [`System::solve`]: solution for the right-hand side of the equations or for any others;
-//! 5. [`System::invert`]: the selected inverse with all cofactors. [`System::reduce`] prepares the cofactors of linear functions.
+//! 4. [`Factor::solve`]: solution for the right-hand side of the equations or for any others;
+//! 5. [`Factor::invert`]: the selected inverse with all cofactors. [`Factor::reduce`] prepares the cofactors of linear functions.
 //!
 //! A system may be part of a larger one ([`Layout::as_part`]). Its outer retained blocks are not eliminated: their front, ordered last, is
 //! assembled but not factored. It is the contribution to the parent system ([`Factor::take_contribution`]), which adds it to its own fronts
@@ -46,7 +46,7 @@
 //! let mut go_on = |_| ControlFlow::Continue(());
 //! let (factoring, solving) = (FactorOptions::default(), SolveOptions::default());
 //! let factor = system.factor(&threads, &equations, &factoring, &mut go_on)?;
-//! let x = system.solve(&threads, &factor, &equations, &solving, &mut go_on)?;
+//! let x = factor.solve(&threads, &equations, &solving, &mut go_on)?;
 //! assert!(x.iter().zip([0.0, 0.0, 0.0, -1.0, -1.0]).all(|(x, expected)| (x - expected).abs() < 1e-12));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```

@@ -10,7 +10,7 @@ use pulp::Simd;
 use super::eliminated::Elimination;
 use super::equations::Equations;
 use super::factor::Factor;
-use super::layout::{Layout, LayoutError};
+use super::layout::LayoutError;
 use super::panels::Panels;
 use super::system::{System, SystemError};
 use super::vectorised::{Kernel, LANES, dot_in_lanes, run_unsized};
@@ -31,11 +31,11 @@ pub struct SolveOptions<'a> {
 /// Number of right-hand sides per multiple solution.
 const TOGETHER: usize = 16;
 
-impl System {
+impl Factor {
     /// Solves the normal equations for all unknowns, in the order of the layout, for one or several right-hand sides; solutions follow one
     /// another. Retained blocks are computed from the factor, then each local block. Bitwise identical for any number of threads.
     ///
-    /// `equations` must belong to the factor. Without a cache the equations are evaluated again; for local blocks with zero
+    /// `equations` must be those of the factor. Without a cache the equations are evaluated again; for local blocks with zero
     /// right-hand sides only once.
     ///
     /// # Errors
@@ -43,49 +43,48 @@ impl System {
     pub fn solve(
         &self,
         threads: &Threads,
-        factor: &Factor,
         equations: &dyn Equations,
         options: &SolveOptions<'_>,
         between: Between<'_>,
     ) -> Result<Vec<f64>, SystemError> {
-        equations.prior().check(&self.layout)?;
+        let System { layout, symbolic, .. } = &*self.system;
+        equations.prior().check(layout)?;
         match options.rights {
-            Some(rights) => self.layout.check_columns("SolveOptions::rights", rights.len())?,
+            Some(rights) => layout.check_columns("SolveOptions::rights", rights.len())?,
             None => {
-                let outer = self.symbolic.outer_unknowns();
+                let outer = symbolic.outer_unknowns();
                 LayoutError::unless_of_length("SolveOptions::outer", options.outer.len(), outer)?;
             }
         }
         let solved = watched(threads, between, |control| {
-            let elimination = self.elimination(factor, equations, control);
+            let elimination = self.elimination(equations, control);
             match options.rights {
                 None => {
-                    let mut others = factor.right.clone();
-                    let first = others.len() - self.symbolic.outer_unknowns();
+                    let mut others = self.right.clone();
+                    let first = others.len() - symbolic.outer_unknowns();
                     others[first..].iter_mut().zip(options.outer).for_each(|(x, given)| *x = *given);
-                    factor.solve_backward(&mut others);
+                    self.solve_backward(&mut others);
                     elimination.complete::<1>(None, &others, 1)
                 }
-                Some(rights) if rights.len() <= self.layout.unknowns() => {
-                    elimination.solve_for::<1>(factor, rights)
-                }
-                Some(rights) => elimination.solve_for::<LANES>(factor, rights),
+                Some(rights) if rights.len() <= layout.unknowns() => elimination.solve_for::<1>(self, rights),
+                Some(rights) => elimination.solve_for::<LANES>(self, rights),
             }
         });
         Ok(solved?)
     }
 
-    /// Returns the local eliminations of a factor.
+    /// Returns the local eliminations.
     pub(super) fn elimination<'a>(
         &'a self,
-        factor: &'a Factor,
         equations: &'a dyn Equations,
         control: &'a Control,
     ) -> Elimination<'a> {
-        let Factor { eliminated: cached, damping, .. } = factor;
-        Elimination { system: self, cached, equations, damping: *damping, control }
+        let Self { system, eliminated: cached, damping, .. } = self;
+        Elimination { system, cached, equations, damping: *damping, control }
     }
+}
 
+impl System {
     /// Returns the rows of retained unknowns in elimination order. `Err`: size of the failed allocation in bytes.
     pub(super) fn of_others(&self, rights: &[f64]) -> Result<Vec<f64>, usize> {
         let (layout, symbolic) = (&self.layout, &*self.symbolic);
@@ -165,18 +164,18 @@ impl Elimination<'_> {
 
 impl Factor {
     /// Returns the corrections of the retained unknowns of a whole system, in the order of the layout.
-    pub fn reduced_corrections(&self, layout: &Layout) -> Vec<f64> {
-        let (first, mut x) = (layout.all_locals().end, self.right.clone());
+    pub fn reduced_corrections(&self) -> Vec<f64> {
+        let (first, mut x) = (self.system.layout.all_locals().end, self.right.clone());
         self.solve_backward(&mut x);
         let mut corrections = vec![0.0; x.len()];
-        self.unknowns(layout).zip(&x).for_each(|(unknown, &x)| corrections[unknown - first] = x);
+        self.unknowns().zip(&x).for_each(|(unknown, &x)| corrections[unknown - first] = x);
         corrections
     }
 
     /// Solves the reduced normal equations for right-hand sides over the retained unknowns, in the order of the layout, one after the
     /// other. Returns solutions in the same form; equations are not formed again.
-    pub fn solve_reduced(&self, layout: &Layout, rights: &[f64]) -> Vec<f64> {
-        let (first, order) = (layout.all_locals().end, self.unknowns(layout).collect::<Vec<usize>>());
+    pub fn solve_reduced(&self, rights: &[f64]) -> Vec<f64> {
+        let (first, order) = (self.system.layout.all_locals().end, self.unknowns().collect::<Vec<usize>>());
         let columns = rights.chunks_exact(order.len().max(1));
         let mut sorted: Vec<f64> =
             columns.flat_map(|right| order.iter().map(|&unknown| right[unknown - first])).collect();

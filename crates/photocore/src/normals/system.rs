@@ -50,9 +50,9 @@ impl System {
     ///
     /// # Errors
     /// [`LayoutError::Pattern`] if the order contradicts the layout, [`LayoutError::Ordering`] if the layout is too large for the ordering.
-    pub fn new(layout: Layout, ordering: Ordering) -> Result<Self, LayoutError> {
+    pub fn new(layout: Layout, ordering: Ordering) -> Result<Arc<Self>, LayoutError> {
         let symbolic = Symbolic::new(&layout, ordering)?;
-        Self::with_pattern(layout, symbolic)
+        Self::with_pattern(layout, symbolic).map(Arc::new)
     }
 
     pub(super) fn with_pattern(layout: Layout, symbolic: Symbolic) -> Result<Self, LayoutError> {

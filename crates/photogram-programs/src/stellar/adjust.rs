@@ -52,7 +52,7 @@ impl Calibration {
     pub fn without_effect(&self, threads: &Threads) -> Result<Vec<usize>, StellarError> {
         let problem = threads.install(|| self.problem(1.0, Partials::Exact))?;
         let normal = self.formed(&problem, vec![], threads)?;
-        Ok(parameters_of(&problem, normal.factor.without_effect(problem.layout())))
+        Ok(parameters_of(&problem, normal.factor.without_effect()))
     }
 
     /// Forms the normal equations at the initial values, with some unknowns fixed.
@@ -85,7 +85,7 @@ impl Calibration {
             AdjustError::Undetermined(_) => {
                 let initial = problem.initial.clone();
                 let normal = Linearized::form(problem, None, initial, vec![], threads, &mut go_on);
-                let found = normal.map_or(vec![], |normal| normal.undetermined_unknowns(problem.layout()));
+                let found = normal.map_or(vec![], |normal| normal.undetermined_unknowns());
                 let named = found.into_iter().map(|unknowns| parameters_of(problem, unknowns));
                 StellarError::Undetermined(named.collect())
             }

@@ -43,20 +43,20 @@ impl Calibration {
     /// Undetermined stars or parameters, or stars without images.
     pub fn correction(&self, tolerances: &Tolerances, threads: &Threads) -> Result<Correction, StellarError> {
         let problem = threads.install(|| self.problem(1.0, Partials::Published(*tolerances)))?;
-        let (first, layout) = (self.formed(&problem, vec![], threads)?, problem.layout());
-        let idle = first.factor.without_effect(layout);
+        let first = self.formed(&problem, vec![], threads)?;
+        let idle = first.factor.without_effect();
         let normal = if idle.is_empty() { first } else { self.formed(&problem, idle.clone(), threads)? };
         if let Some(error @ AdjustError::UndeterminedLocals(_)) = normal.undetermined() {
             return Err(self.named(&problem, error, threads));
         }
         let undetermined = || {
-            let combinations = normal.undetermined_unknowns(layout).into_iter();
+            let combinations = normal.undetermined_unknowns().into_iter();
             StellarError::Undetermined(combinations.map(|each| parameters_of(&problem, each)).collect())
         };
         let found = self.of_parameters(&normal, &problem, threads)?;
         let (log_determinant, cofactors) = found.ok_or_else(undetermined)?;
         Ok(Correction {
-            parameters: normal.factor.reduced_corrections(layout),
+            parameters: normal.factor.reduced_corrections(),
             cofactors,
             log_determinant,
             without_effect: parameters_of(&problem, idle),
