@@ -11,6 +11,9 @@ const BASE: usize = 8 << 20;
 /// Size of the largest factor that is copied for hypotheses, in bytes.
 const COPIED: usize = 128 << 20;
 
+/// Size of a front in progress, and size that waits in it during the visit of each child, for one or several threads.
+type Sizes<'a> = dyn Fn(usize, &Supernode, bool) -> (usize, Vec<usize>) + 'a;
+
 impl System {
     /// Estimates the maximum size of all phases with a number of threads in bytes, including the problem and its results: the factor,
     /// simultaneous fronts and vectors.
@@ -88,13 +91,8 @@ impl System {
     /// thread, since the order of its visits is known.
     ///
     /// * `kept`: size that waits after the visits of a subtree;
-    /// * `sizes`: size of a front in progress, and size that waits in it during the visit of each child, for one or several threads.
-    fn most(
-        &self,
-        threads: usize,
-        kept: &dyn Fn(usize) -> usize,
-        sizes: &dyn Fn(usize, &Supernode, bool) -> (usize, Vec<usize>),
-    ) -> usize {
+    /// * `sizes`: sizes of a supernode by index; the last argument is true for one thread.
+    fn most(&self, threads: usize, kept: &dyn Fn(usize) -> usize, sizes: &Sizes<'_>) -> usize {
         let (mut most, mut chains) = (Vec::<usize>::new(), vec![]);
         for (index, s) in self.symbolic.supernodes().iter().enumerate() {
             let alone = threads == 1 || !self.tree.is_above(index);
