@@ -9,8 +9,8 @@ use nalgebra::DMatrix;
 use smallvec::SmallVec;
 
 use super::loss::Reweighting;
-use super::problem::{AnyProblem, Evaluated, is_weighted};
-use super::terms::{Term, Terms};
+use super::problem::{AnyProblem, Evaluated};
+use super::terms::{Term, Terms, is_weighted};
 use super::walk::Buffers;
 use crate::normals::{Contribution, Equations, GroupRows, Prior};
 use crate::{Threads, parallel};

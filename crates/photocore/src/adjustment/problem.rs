@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::terms::Terms;
+use super::terms::{Terms, is_weighted};
 use crate::normals::{GroupRows, Layout, LayoutError, System};
 
 /// Functional model: computes observations from unknowns.
@@ -190,6 +190,11 @@ impl<M: Model> Problem<M> {
 }
 
 impl AnyProblem<'_> {
+    /// Returns the prior terms at given values.
+    pub fn terms(&self, values: &[f64]) -> Terms {
+        Terms::new(self.model.terms(values, &self.prior, &self.sd), values, &self.prior, &self.sd)
+    }
+
     /// Returns an error unless all arrays and `values` have the lengths of the layout.
     pub(super) fn check_lengths(&self, values: &[f64]) -> Result<(), LayoutError> {
         let (equations, unknowns) = (self.layout().equations(), self.layout().unknowns());
@@ -206,9 +211,4 @@ impl AnyProblem<'_> {
         self.model.advance(&mut values, step);
         values
     }
-}
-
-/// Whether an unknown with this standard deviation is weighted: neither free nor fixed.
-pub(super) fn is_weighted(sd: f64) -> bool {
-    sd > 0.0 && sd.is_finite()
 }

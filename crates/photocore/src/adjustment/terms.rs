@@ -2,8 +2,6 @@
 
 use std::ops::Range;
 
-use super::problem::{AnyProblem, Model, is_weighted};
-
 /// Prior terms at given values, ascending: terms of the model ([`Model::terms`]), and one term per other weighted unknown.
 #[derive(Debug, Default)]
 pub struct Terms {
@@ -51,9 +49,10 @@ impl<'a> Term<'a> {
 }
 
 impl Terms {
-    /// Creates the terms at given values; `prior` and `sd` are observed values and standard deviations of the unknowns.
-    pub fn new(model: &dyn Model, values: &[f64], prior: &[f64], sd: &[f64]) -> Self {
-        let mut all = model.terms(values, prior, sd);
+    /// Adds terms of the other weighted unknowns to those of a model at given values; `prior` and `sd` are observed values and standard
+    /// deviations of the unknowns.
+    pub fn new(of_model: Self, values: &[f64], prior: &[f64], sd: &[f64]) -> Self {
+        let mut all = of_model;
         all.sort();
         let of_model: Vec<Range<usize>> = all.places.iter().map(Place::unknowns).collect();
         let mut of_model = of_model.into_iter().peekable();
@@ -125,9 +124,7 @@ pub(super) fn weighted_among(sd: &[f64], of: Range<usize>) -> impl Iterator<Item
     stretches.filter(move |stretch| !free(stretch)).flatten().filter(|&unknown| is_weighted(sd[unknown]))
 }
 
-impl AnyProblem<'_> {
-    /// Returns the prior terms at given values.
-    pub fn terms(&self, values: &[f64]) -> Terms {
-        Terms::new(&self.model, values, &self.prior, &self.sd)
-    }
+/// Whether an unknown with this standard deviation is weighted: neither free nor fixed.
+pub(super) fn is_weighted(sd: f64) -> bool {
+    sd > 0.0 && sd.is_finite()
 }

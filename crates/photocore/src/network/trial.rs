@@ -11,7 +11,7 @@ use super::problem::Assembled;
 use super::test_groups::TestGroups;
 use crate::Threads;
 use crate::adjustment::{
-    self, AdjustError, EquationOf, Leverages, Loss, Method, Requests, Status, Stop, Terms, Watch,
+    self, AdjustError, EquationOf, Leverages, Loss, Method, Model, Requests, Status, Stop, Terms, Watch,
 };
 use crate::geometry::PoseNumbers;
 
@@ -322,7 +322,7 @@ impl Trial {
     /// Returns the prior terms of the parameters, with given standard deviations.
     pub(super) fn terms(&self, sd: &[f64], values: &[f64]) -> Terms {
         let problem = &self.assembled.problem;
-        Terms::new(&problem.model, values, &problem.prior, sd)
+        Terms::new(problem.model.terms(values, &problem.prior, sd), values, &problem.prior, sd)
     }
 
     /// Returns the observation of an equation of a test group.
