@@ -345,8 +345,8 @@ def test_records_that_a_trajectory_does_not_reach_are_left_out(moving_projects):
     found = formats.read(lines)
     told = [str(each) for each in found.messages]
     assert len(told) == 2
-    assert "gnss.csv: 1 record at a time outside its trajectory" in told[0]
-    assert "rates.csv: 2 records at times" in told[1]
+    assert "gnss.csv: 1 record outside the time of its trajectory" in told[0]
+    assert "rates.csv: 2 records outside the time" in told[1]
     assert len(found.block.observations) == len(plain.observations)
 
 

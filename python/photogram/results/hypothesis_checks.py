@@ -100,7 +100,8 @@ def in_deviations(
 def correlate(found: Facts, rows: Iterable[int], checks: int, joint: Joint) -> None:
     """Correlate the scores of sets that only check points test: the largest canonical correlations."""
     flat, _, inverse = joint
-    root, bases = np.linalg.cholesky(inverse).T, {}
+    values, vectors = np.linalg.eigh(inverse)
+    root, bases = np.sqrt(np.maximum(values, 0.0))[:, np.newaxis] * vectors.T, {}
     for row in rows:
         changes = np.reshape(found["sets"][row]["at_checks"], (3 * checks, -1))[flat]
         bases[row] = np.linalg.qr(root @ changes)[0]
