@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-/// Prior terms at given values, ascending: terms of the model ([`Model::terms`]), and one term per other weighted unknown.
+/// Prior terms at given values, ascending: terms of the model ([`super::Model::terms`]), and one term per other weighted unknown.
 #[derive(Debug, Default)]
 pub struct Terms {
     places: Vec<Place>,
