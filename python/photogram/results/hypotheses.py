@@ -167,7 +167,7 @@ class Hypotheses:
             return -math.inf if is_reason else math.inf
         return self.limit * size / others - self.deviates[row] if others else math.inf
 
-    def _is_harmful(self, row: int) -> bool:
+    def is_harmful(self, row: int) -> bool:
         """Whether the largest error that the observations admit moves two other points beyond the limit."""
         return self.margin(row) < MARGIN
 
@@ -213,7 +213,7 @@ class Hypotheses:
     @property
     def harmful(self) -> list[int]:
         """Rows whose undetected errors move points too far, the worst first, without special cases."""
-        rows = [row for row in self.effects if self._is_harmful(row)]
+        rows = [row for row in self.effects if self.is_harmful(row)]
         rows.sort(key=lambda row: (self.sizes[row] > 0, -_rank(self.moved(row))))
         special = {other for row in rows for other in self._special_cases(row)}
         return [row for row in rows if row not in special]
@@ -235,7 +235,7 @@ class Hypotheses:
             other
             for other in nested
             if source[other] == source[row] and count[other] == 1 and (count[row] > 1 or other > row)
-            if other in self.effects and self._is_harmful(other)
+            if other in self.effects and self.is_harmful(other)
         ]
 
     @property

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, MutableMapping
-from itertools import product
+from collections.abc import MutableMapping, Sequence
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -78,35 +78,48 @@ def in_deviations(
     `variance`: the estimated variance of unit weight; None if it is known.
     """
     deviates, sizes, errors = {}, {}, {}
-    for row, (*_, changes) in found["effects"].items():
+    squares = scores = np.zeros(len(found["effects"]))
+    if joint is not None and len(squares):
+        flat, differences, inverse = joint
+        g = np.stack([changes[:checks].ravel()[flat] for *_, changes in found["effects"].values()])
+        weighted = np.where(np.isfinite(g).all(axis=1, keepdims=True), g, 0.0) @ inverse
+        squares, scores = np.nansum(weighted * g, axis=1), weighted @ differences
+    for row, square, score in zip(found["effects"], squares.tolist(), scores.tolist(), strict=True):
         mdb = found["mdb"][row]
         tested = 0.0 if np.isnan(mdb[0]) else float(found["noncentrality"][row])
         own = found["sets"][row] if row < len(found["sets"]) else found["groups"].get(row, {})
         errors[row] = mdb[~np.isnan(mdb)] if tested else np.array(own.get("error", []))
-        squares, score = 0.0, 0.0
-        if joint is not None and len(errors[row]):
-            flat, differences, inverse = joint
-            g = changes[:checks].ravel()[flat]
-            if np.isfinite(g).all():
-                squares, score = float(g @ inverse @ g), float(g @ inverse @ differences)
+        square = square if len(errors[row]) else 0.0
         statistic = np.nan_to_num(found["statistic"][row]) - max(found["rank"][row] - 1, 0)
         if variance is not None:  # Their statistics do not include check points
-            statistic = statistic / variance if tested else np.divide(score**2, squares or 1.0)
+            statistic = statistic / variance if tested else score**2 / (square or 1.0)
         deviates[row] = math.sqrt(max(statistic, 0.0))
-        sizes[row] = math.sqrt(tested + (variance or 1.0) * squares)
+        sizes[row] = math.sqrt(tested + (variance or 1.0) * square)
     return deviates, sizes, errors
 
 
-def correlate(found: Facts, rows: Iterable[int], checks: int, joint: Joint) -> None:
-    """Correlate the scores of sets that only check points test: the largest canonical correlations."""
+def correlate(found: Facts, rows: Sequence[int], checks: int, joint: Joint) -> None:
+    """Correlate the scores of sets that only check points test: the largest canonical correlations.
+
+    All redundancies G' C^-1 G are one matrix, because its blocks are small: factors of C would take longer.
+    """
+    if len(rows) < 2:
+        return
     flat, _, inverse = joint
-    values, vectors = np.linalg.eigh(inverse)
-    root, bases = np.sqrt(np.maximum(values, 0.0))[:, np.newaxis] * vectors.T, {}
-    for row in rows:
-        changes = np.reshape(found["sets"][row]["at_checks"], (3 * checks, -1))[flat]
-        bases[row] = np.linalg.qr(root @ changes)[0]
-    for first, second in product(bases, repeat=2):
-        found["correlations"][first, second] = np.linalg.norm(bases[first].T @ bases[second], 2)
+    changes = [np.reshape(found["sets"][row]["at_checks"], (3 * checks, -1))[flat] for row in rows]
+    ends = np.cumsum([own.shape[1] for own in changes]).tolist()
+    blocks = [slice(end - own.shape[1], end) for own, end in zip(changes, ends, strict=True)]
+    whole = np.hstack(changes)
+    redundancy = whole.T @ inverse @ whole
+    white = np.zeros_like(redundancy)
+    for block in blocks:
+        values, vectors = np.linalg.eigh(redundancy[block, block])
+        seen = values > SINGULAR * values[-1]
+        white[block, block] = vectors * np.where(seen, np.where(seen, values, 1.0) ** -0.5, 0.0)
+    scores = white.T @ redundancy @ white
+    for (one, own), (other, its) in combinations(zip(rows, blocks, strict=True), 2):
+        correlation = np.linalg.norm(scores[own, its], 2)
+        found["correlations"][[one, other], [other, one]] = correlation
 
 
 def _inverse(matrix: Floats, units: Floats) -> Floats:

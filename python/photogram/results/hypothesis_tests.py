@@ -83,7 +83,6 @@ def hypotheses(
             units = own["plausible"] if of_set else trial.deviations[suspects.rows(int(groups[row]))]
             if row in effects and with_checks(found, row, own, units, checks, joint):
                 relative.add(row)
-        correlate(found, relative, checks, joint)
     variance = None if known else standing[0] / standing[1]
     deviates, sizes, errors = in_deviations(found, checks, joint, variance)
     for own in found["sets"]:
@@ -131,7 +130,7 @@ def hypotheses(
         "bias_to_noise",
         "sets",
     )
-    return Hypotheses(
+    every = Hypotheses(
         **{name: found[name] for name in same},
         code=np.array(found["code"], dtype=np.str_),
         group=groups,
@@ -153,6 +152,9 @@ def hypotheses(
         relative=relative,
         single_odds=float(np.nanmax(odds[sets:], initial=max(of_images, checked))),
     )
+    if joint is not None:
+        correlate(found, [row for row in sorted(relative) if every.is_harmful(row)], checks, joint)
+    return every
 
 
 def shifted_photos(suspects: NamedSuspects, tests: Tests) -> list[int]:
