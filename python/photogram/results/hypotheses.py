@@ -462,6 +462,8 @@ class Hypotheses:
             f"MDB: the error that tests of the level {DETECTION[0]:g} detect in {100 * DETECTION[1]:.0f} of"
             f" 100 cases. Otherwise, points moved change by more than {self.limit:g} standard deviations."
         )
+        if not self.planned:
+            note += f" The verdict judges the estimate of an error and {MARGIN:g} standard deviations of it."
         return Table("external-reliability", "Undetected errors", columns, note)
 
     def document(self) -> list[dict[str, Any]]:

@@ -177,7 +177,6 @@ mod tests {
         assert!(counted <= predicted && 2 * predicted <= 3 * counted, "{predicted}, counted {counted}");
         for threads in [2, 3, 8] {
             let (predicted, counted, inverse) = fronts(system, threads);
-            eprintln!("{threads} threads: {predicted}, counted {counted}");
             assert!(counted <= predicted, "{threads} threads: {predicted}, counted {counted}");
             let bits = |inverse: &SelectedInverse| {
                 let blocks = 0..system.symbolic.blocks();
