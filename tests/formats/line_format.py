@@ -12,8 +12,8 @@ from photogram import Attitudes, Camera
 from photogram.formats import Format
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import cards
+from photogram.formats.format import later
 from photogram.formats.images import lens_with, named_pixels, sizes_of
-from photogram.formats.recognition import has_suffix
 from photogram.io.places import image_size, one_word
 
 TITLE, CONTENTS = "file of lines", frozenset({"names", "shared-cameras", "control"})
@@ -55,5 +55,6 @@ def write(project):
     return {"block.lines": "".join(f"{' '.join(map(str, row))}\n" for row in rows).encode()}
 
 
-FILES, recognises = ("block.lines", "*.lines"), lambda path: has_suffix(".lines", path)
-FORMAT = Format("lines", TITLE, recognises, read, write, files=FILES, pixels=True, holds=CONTENTS)
+FILES = ("block.lines", "*.lines")
+RECOGNISES = later("recognition:has_suffix .lines")
+FORMAT = Format("lines", TITLE, RECOGNISES, read, write, files=FILES, pixels=True, holds=CONTENTS)

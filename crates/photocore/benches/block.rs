@@ -9,7 +9,6 @@
 
 use std::fmt::Debug;
 use std::hint::black_box;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
@@ -20,7 +19,7 @@ use photocore::network::{Camera, Image, Network, Options, Photo, Point, Screens,
 use photocore::normals::{
     Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, Ordering, Prior, SolveOptions, System,
 };
-use photocore::{Threads, adjustment};
+use photocore::{Context, Threads, adjustment};
 
 /// Number of rows and columns of the dense product.
 const DENSE: usize = 1024;
@@ -186,7 +185,7 @@ impl Phases {
     }
 
     fn factor(&self) -> Factor {
-        done(self.system.factor(&self.threads, &self.equations, &FactorOptions::default(), &mut go))
+        done(self.system.factor(&self.equations, &FactorOptions::default(), &mut Context::new(&self.threads)))
     }
 
     /// Returns the multiply-adds of the formation with its reduction, and of the cofactors, from the numbers of rays of the points. In
@@ -204,10 +203,6 @@ impl Phases {
 
 fn threads() -> Threads {
     Threads::new(0).expect("threads")
-}
-
-fn go(_: usize) -> ControlFlow<()> {
-    ControlFlow::Continue(())
 }
 
 fn done<T, E: Debug>(result: Result<T, E>) -> T {
@@ -255,7 +250,9 @@ fn adjust(criterion: &mut Criterion) {
         screens: Screens::default(),
         photo_corrections: false,
     };
-    let adjust = |block: &Network| block.adjustment(&options).on(&threads).run().expect("a determined block");
+    let adjust = |block: &Network| {
+        block.adjustment(&options).run_in(&mut Context::new(&threads)).expect("a determined block")
+    };
     let shared = with_shared_camera(&block);
     let mut group = criterion.benchmark_group(format!("block/{size}"));
     group.throughput(Throughput::Elements(block.photos.len() as u64));
@@ -288,15 +285,16 @@ fn phases(criterion: &mut Criterion) {
     });
     let factor = phases.factor();
     group.bench_function("solve", |bencher| {
-        bencher.iter(|| done(factor.solve(threads, equations, &SolveOptions::default(), &mut go)));
+        bencher.iter(|| done(factor.solve(equations, &SolveOptions::default(), &mut Context::new(threads))));
     });
     // Formation, reduction and factorization are interleaved, front by front, as are selected inverse and cofactors.
     group.throughput(elements(formation + predicted.factor));
     group.bench_function("factor", |bencher| bencher.iter(|| phases.factor()));
     group.throughput(elements(predicted.inverse + cofactors));
     group.bench_function("invert", |bencher| {
-        let invert =
-            |factor: Factor| done(factor.invert(threads, equations, &InvertOptions::default(), &mut go));
+        let invert = |factor: Factor| {
+            done(factor.invert(equations, &InvertOptions::default(), &mut Context::new(threads)))
+        };
         bencher.iter_batched(|| phases.factor(), invert, BatchSize::PerIteration);
     });
     group.finish();

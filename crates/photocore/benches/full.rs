@@ -4,7 +4,6 @@
 // Panics are acceptable in a benchmark.
 #![allow(clippy::expect_used, missing_docs)]
 
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -12,8 +11,8 @@ use criterion::{BatchSize, Criterion, criterion_group, criterion_main};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::{Mat, Par};
-use photocore::Threads;
 use photocore::normals::{Equations, FactorOptions, GroupRows, Layout, Ordering, Prior, System};
+use photocore::{Context, Threads};
 
 /// Number of unknowns of a photograph.
 const DIM: usize = 9;
@@ -50,8 +49,7 @@ fn system(photos: usize) -> (Arc<System>, Anything) {
 /// Returns the time of the factorization without the formation.
 fn factor(threads: &Threads, system: &Arc<System>, equations: &Anything) -> Duration {
     let start = Instant::now();
-    let done =
-        system.factor(threads, equations, &FactorOptions::default(), &mut |_| ControlFlow::Continue(()));
+    let done = system.factor(equations, &FactorOptions::default(), &mut Context::new(threads));
     let elapsed = start.elapsed();
     match done {
         Ok(factor) => elapsed.mul_f64(1.0 - factor.formation_share),

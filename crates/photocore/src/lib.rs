@@ -17,6 +17,7 @@
 //! | step | layer | types |
 //! | --- | --- | --- |
 //! | input | `network` | `Network`, `Options` |
+//! | threads, progress, cancellation | crate | `Context` |
 //! | active points, photos and images | `network` | `Selected` |
 //! | parameters and observation equations | `network` | `Bundle`, `Assembled` |
 //! | pattern of the normal equations | `normals` | `Layout`, `Symbolic`, `Incidence`, `System` |
@@ -46,6 +47,7 @@
 //! | Q of the outer blocks of a part | [`normals::InvertOptions`] | the parent system, which may be elsewhere, computes it |
 
 pub mod adjustment;
+mod context;
 pub mod geometry;
 pub mod network;
 pub mod normals;
@@ -54,14 +56,13 @@ mod parallel;
 /// Functions that other crates of this project use; they may change at any time.
 #[doc(hidden)]
 pub mod internal {
-    pub use crate::adjustment::{
-        ObservationEquations, Reweighting, Transformation, between, go_on, median, moved,
-    };
+    pub use crate::adjustment::{ObservationEquations, Reweighting, Transformation, median, moved};
     pub use crate::geometry::principal_axes;
     pub use crate::network::{Assembled, Selected, meet};
     pub use crate::parallel::map;
 }
 
+pub use context::{Context, Event, Iteration, Phase};
 pub use nalgebra;
 pub use parallel::{Stopped, Threads};
 

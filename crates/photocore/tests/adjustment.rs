@@ -11,11 +11,11 @@ use std::sync::Mutex;
 use std::thread::{self, ThreadId};
 
 use photocore::adjustment::{
-    AdjustError, Adjustment, Evaluated, Event, Linearized, Method, Model, Options, Phase, Problem, Published,
-    Requests, Status, Stop, adjust, adjust_with,
+    AdjustError, Adjustment, Evaluated, Linearized, Method, Model, Options, Problem, Published, Requests,
+    Status, Stop, adjust, adjust_with,
 };
 use photocore::normals::{GroupRows, Layout, LayoutError, Ordering, System};
-use photocore::{Stopped, Threads};
+use photocore::{Context, Event, Phase, Stopped, Threads};
 
 const FRAMES: usize = 4;
 const POINTS: usize = 9;
@@ -134,7 +134,7 @@ const STRICT: Options = Options {
 fn run(problem: &Problem<Frames>, options: &Options) -> Result<Adjustment, AdjustError> {
     let threads = Threads::new(1).unwrap();
     let requests = Requests { history: usize::MAX, ..Requests::default() };
-    adjust_with(problem, options, requests, &threads, &mut |_| ControlFlow::Continue(()))
+    adjust_with(problem, options, requests, &mut Context::new(&threads))
 }
 
 /// Two points with both coordinates: the datum of the plane, and its scale.
@@ -272,20 +272,19 @@ fn slices_of_other_lengths_are_refused() {
             slice(&mut problem).resize(length, 1.0);
             let expected = AdjustError::Layout(LayoutError::Length { field, length, required });
             assert_eq!(run(&problem, &STRICT).unwrap_err(), expected);
-            let mut go = |_| ControlFlow::Continue(());
-            let formed = Linearized::form(&problem, None, truth(), vec![], &threads, &mut go);
+            let formed = Linearized::form(&problem, None, truth(), vec![], &mut Context::new(&threads));
             assert_eq!(formed.unwrap_err(), expected);
         }
     }
 }
 
 #[test]
-fn the_watch_hears_of_every_phase_and_stops_any() {
+fn progress_reports_every_phase_and_stops_any() {
     let mut problem = problem();
     hold(&mut problem, &DATUM, 0.0);
     let threads = Threads::new(1).unwrap();
     let (mut events, mut phases, mut iterations) = (0, Vec::new(), 0);
-    let whole = adjust(&problem, &STRICT, &threads, &mut |event| {
+    let mut progress = |event| {
         events += 1;
         match event {
             Event::Progress { phase, done, total } => {
@@ -298,17 +297,19 @@ fn the_watch_hears_of_every_phase_and_stops_any() {
             }
         }
         ControlFlow::Continue(())
-    });
+    };
+    let whole = adjust(&problem, &STRICT, &mut Context::with_progress(&threads, &mut progress));
     assert_eq!(whole.unwrap().iterations.len(), iterations);
     for phase in [Phase::Form, Phase::Solve, Phase::Invert] {
         assert!(phases.contains(&phase), "{phase:?}");
     }
     for last in 0..events {
         let mut count = 0;
-        let stopped = adjust(&problem, &STRICT, &threads, &mut |_| {
+        let mut progress = |_| {
             count += 1;
             if count > last { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        });
+        };
+        let stopped = adjust(&problem, &STRICT, &mut Context::with_progress(&threads, &mut progress));
         assert_eq!(stopped.unwrap_err(), AdjustError::Stopped(Stopped::Interrupted));
         assert_eq!(count, last + 1);
     }
@@ -362,8 +363,7 @@ fn a_thread_of_another_pool_watches_and_leaves_the_work_to_the_pool_that_it_is_g
             let Problem { model, system, observation_sd, initial, prior, sd } = held;
             let model = Witness { frames: model, seen: Mutex::default() };
             let problem = Problem { model, system, observation_sd, initial, prior, sd };
-            let mut watch = |_: Event| ControlFlow::Continue(());
-            adjust(&problem, &STRICT, threads, &mut watch).unwrap();
+            adjust(&problem, &STRICT, &mut Context::new(threads)).unwrap();
             problem.model.seen.into_inner().unwrap().contains(&thread::current().id())
         })
     });

@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::panic)]
 
-use photocore::Threads;
 use photocore::adjustment::{self, Method, Status, Stop};
 use photocore::geometry::{ObjectSpace, Orientation, Perspective, Point as At, PoseNumbers, RotationSense};
 use photocore::network::{Camera, Coarse, Image, Network, NetworkError, Options, Photo, Point, Solution};
+use photocore::{Context, Threads};
 
 use crate::noise;
 
@@ -75,7 +75,7 @@ fn adjust(block: &Network) -> Result<Solution, NetworkError> {
         adjustment::Options { method: Method::Damped(Stop::Fraction(1e-6)), ..Default::default() };
     let options = Options { adjustment, ..Options::default() };
     let threads = Threads::new(1).unwrap();
-    block.adjustment(&options).on(&threads).run()
+    block.adjustment(&options).run_in(&mut Context::new(&threads))
 }
 
 /// A core called from Rust needs no memory for an interpreter; `reserved` is set by callers that do.
@@ -84,7 +84,7 @@ fn memory_is_that_of_the_adjustment_and_what_the_caller_takes() {
     let room = |memory, reserved| {
         let options = Options { memory: Some(memory), reserved, ..Options::default() };
         let threads = Threads::new(1).unwrap();
-        sound().adjustment(&options).on(&threads).run().map(drop)
+        sound().adjustment(&options).run_in(&mut Context::new(&threads)).map(drop)
     };
     assert_eq!(room(16 << 20, 0), Ok(()));
     match room(16 << 20, 12 << 20) {

@@ -4,13 +4,13 @@
 
 use std::f64::consts::FRAC_PI_2;
 
-use photocore::Threads;
 use photocore::adjustment::{Method, Published, Status};
 use photocore::geometry::{
     AttitudeNumbers, Matrix3, ObjectSpace, Orientation, Perspective, Point as At, PoseNumbers, RotationSense,
     Vector3, angle_axis_rotation,
 };
 use photocore::network::{Camera, Image, Network, NetworkError, Options, Photo, Point, Solution};
+use photocore::{Context, Threads};
 
 use crate::noise;
 
@@ -73,7 +73,7 @@ fn around(sense: RotationSense, turned: &Matrix3, image_error: f64, error: f64) 
 
 fn adjust(network: &Network) -> Result<Solution, NetworkError> {
     let threads = Threads::new(1).unwrap();
-    network.adjustment(&Options::default()).on(&threads).run()
+    network.adjustment(&Options::default()).run_in(&mut Context::new(&threads))
 }
 
 fn block(cofactors: &[f64], first: usize) -> Matrix3 {
@@ -170,7 +170,7 @@ fn weighted_angles_are_observations_of_the_angles() {
         published.adjustment.method = Method::Full(Published::Percent(1e-10));
         published.adjustment.max_iterations = 30;
         let threads = Threads::new(2).unwrap();
-        let expected = network.adjustment(&published).on(&threads).run().unwrap();
+        let expected = network.adjustment(&published).run_in(&mut Context::new(&threads)).unwrap();
         let found = adjust(&network).unwrap();
         assert_eq!(found.adjustment.status, Status::Converged);
         assert_eq!(found.degrees_of_freedom, expected.degrees_of_freedom);

@@ -3,7 +3,6 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use num_complex::Complex64 as C;
-use photocore::Threads;
 use photocore::adjustment::{self, Loss, Method, Status, Stop};
 use photocore::geometry::{
     self, Bal, ObjectSpace, Orientation, Perspective, Point as GroundPoint, PoseNumbers, angle_axis_rotation,
@@ -12,6 +11,7 @@ use photocore::geometry::{
 use photocore::network::{
     AdjustedPhoto, Camera, Coarse, Image, Network, NetworkError, Options, Photo, Point, Solution, Start,
 };
+use photocore::{Context, Threads};
 use proptest::prelude::*;
 
 use crate::noise;
@@ -176,7 +176,7 @@ fn adjusted_from(
         ..Default::default()
     };
     let options = Options { adjustment, start, hold_unused: true, ..Options::default() };
-    collection.adjustment(&options).on(&threads).run()
+    collection.adjustment(&options).run_in(&mut Context::new(&threads))
 }
 
 fn sum(solution: &Solution) -> f64 {

@@ -3,10 +3,8 @@
 #![allow(clippy::unwrap_used)]
 
 use std::f64::consts::TAU;
-use std::ops::ControlFlow;
 
 use faer::{Mat, Side};
-use photocore::Threads;
 use photocore::adjustment::{self, DatumError, Method, Published, Status, Stop};
 use photocore::geometry::{
     AttitudeNumbers, CameraModel, Ellipsoid, Matrix3, ObjectSpace, Orientation, Perspective, Point as At,
@@ -16,6 +14,7 @@ use photocore::network::{
     Camera, Image, InnerConstraints, Network, NetworkDatum, NetworkError, Of, Options, Photo, Point,
     Solution, Start,
 };
+use photocore::{Context, Threads};
 
 use crate::{noise, noises};
 
@@ -77,11 +76,11 @@ fn options(method: Method) -> Options {
 const FINE: Method = Method::Damped(Stop::Fraction(1e-9));
 
 fn adjust(network: &Network, method: Method) -> Result<Solution, NetworkError> {
-    network.adjustment(&options(method)).on(&threads()).run()
+    network.adjustment(&options(method)).run_in(&mut Context::new(&threads()))
 }
 
 fn in_datum(network: &Network, inner: &InnerConstraints) -> Result<Solution, NetworkError> {
-    network.adjustment(&options(FINE)).in_datum(inner).on(&threads()).run()
+    network.adjustment(&options(FINE)).in_datum(inner).run_in(&mut Context::new(&threads()))
 }
 
 /// Returns the design matrix at the adjusted values, for unit weight: points, then positions and rotation steps of the photos.
@@ -221,10 +220,10 @@ fn inner_constraints_are_those_of_the_pseudo_inverse() {
 /// Returns the full cofactor matrix of photos (position and rotation step) and points, in the order of [`design`].
 fn whole(network: &Network, solution: &Solution, datum: Option<&NetworkDatum>) -> Mat<f64> {
     let (options, threads) = (options(FINE), threads());
-    let mut go = |_| ControlFlow::Continue(());
-    let covariances = network.covariances(&options, &solution.state, datum, &threads, &mut go).unwrap();
+    let covariances =
+        network.covariances(&options, &solution.state, datum, &mut Context::new(&threads)).unwrap();
     let of: Vec<Of> = (0..POINTS).map(Of::Point).chain((0..PHOTOS).map(Of::PhotoStep)).collect();
-    let found = covariances.cofactors(&of, None, &threads, &mut go).unwrap();
+    let found = covariances.cofactors(&of, None, &mut Context::new(&threads)).unwrap();
     let count = 3 * POINTS + 6 * PHOTOS;
     Mat::from_fn(count, count, |i, j| found[i * count + j])
 }
@@ -264,14 +263,13 @@ fn cofactors_of_everything_go_over_to_any_datum() {
     assert!(apart < 1e-8, "{apart:e}");
 
     // Without another adjustment, from the minimal datum and from a third one.
-    let mut go = |_| ControlFlow::Continue(());
     let (options, threads) = (options(FINE), threads());
     let datum = NetworkDatum::Inner(inner);
     let two =
         NetworkDatum::Inner(InnerConstraints { points: vec![3, 7, 9], scale: true, ..Default::default() });
-    let by_two = network.in_datum(&options, &minimal.state, &two, &threads, &mut go).unwrap();
+    let by_two = network.in_datum(&options, &minimal.state, &two, &mut Context::new(&threads)).unwrap();
     for from in [&minimal, &by_two] {
-        let there = network.in_datum(&options, &from.state, &datum, &threads, &mut go).unwrap();
+        let there = network.in_datum(&options, &from.state, &datum, &mut Context::new(&threads)).unwrap();
         for (photo, expected) in there.photos.iter().zip(&found.photos) {
             let position = Vector3::from_column_slice(&photo.pose[..3]);
             assert!((position - Vector3::from_column_slice(&expected.pose[..3])).amax() < 1e-9);
@@ -434,7 +432,7 @@ fn geographic_networks_are_free_to_move_too() {
     };
     let mut given = options(Method::default());
     given.start = Start::Given;
-    let found = network.adjustment(&given).in_datum(&inner).on(&threads()).run().unwrap();
+    let found = network.adjustment(&given).in_datum(&inner).run_in(&mut Context::new(&threads())).unwrap();
     for (r, expected) in redundancies(&found).iter().zip(redundancies(&minimal)) {
         assert!((r - expected).abs() < 1e-6);
     }

@@ -3,9 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::panic)]
 
 use std::f64::consts::TAU;
-use std::ops::ControlFlow;
 
-use photocore::Threads;
 use photocore::adjustment::{self, Method, Status, Stop};
 use photocore::geometry::{AttitudeNumbers, Matrix3, Perspective, Pose, RotationSense, Vector3, rotation};
 use photocore::network::mounts::OnFrame;
@@ -16,6 +14,7 @@ use photocore::network::{
     Camera, Combination, Common, CommonKind, Image, InnerConstraints, Network, NetworkDatum, NetworkError,
     Observation, Options, Photo, Point, Precision, Solution,
 };
+use photocore::{Context, Threads};
 
 use crate::{noise, noises};
 
@@ -138,7 +137,7 @@ fn options() -> Options {
 
 fn adjust(network: &Network) -> Result<Solution, NetworkError> {
     let threads = Threads::new(1).unwrap();
-    network.adjustment(&options()).on(&threads).run()
+    network.adjustment(&options()).run_in(&mut Context::new(&threads))
 }
 
 #[test]
@@ -147,7 +146,6 @@ fn common_unknowns_move_with_a_free_network() {
     // Deviations from a plane in metres decrease with the scale: another observation must define the scale.
     network.observations.push(base());
     let threads = Threads::new(2).unwrap();
-    let mut go = |_| ControlFlow::Continue(());
     let minimal = adjust(&network).unwrap();
     assert_eq!(minimal.adjustment.status, Status::Converged);
     assert_eq!(minimal.datum.held.len(), 6, "{:?}", minimal.datum.held);
@@ -157,9 +155,9 @@ fn common_unknowns_move_with_a_free_network() {
         NetworkDatum::Inner(InnerConstraints { points: points.collect(), ..Default::default() })
     };
     let (first, second) = (datum(0..7), datum(7..14));
-    let by_first = network.in_datum(&options(), &minimal.state, &first, &threads, &mut go).unwrap();
-    let direct = network.in_datum(&options(), &minimal.state, &second, &threads, &mut go).unwrap();
-    let by_way = network.in_datum(&options(), &by_first.state, &second, &threads, &mut go).unwrap();
+    let by_first = network.in_datum(&options(), &minimal.state, &first, &mut Context::new(&threads)).unwrap();
+    let direct = network.in_datum(&options(), &minimal.state, &second, &mut Context::new(&threads)).unwrap();
+    let by_way = network.in_datum(&options(), &by_first.state, &second, &mut Context::new(&threads)).unwrap();
     for (k, (a, b)) in direct.commons.iter().zip(&by_way.commons).enumerate() {
         let sd = |i: usize| b.cofactors[i * (b.change.len() + 1)].sqrt();
         for i in 0..a.change.len() {

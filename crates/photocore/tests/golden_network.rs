@@ -3,16 +3,15 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
 use std::collections::HashMap;
-use std::ops::ControlFlow;
 
 use nalgebra::Matrix6;
-use photocore::Threads;
 use photocore::adjustment::{self, Method, Stop};
 use photocore::geometry::{self, AttitudeNumbers, Matrix3, Perspective, PoseNumbers, RotationSense};
 use photocore::network::observations::{Distance, Observation};
 use photocore::network::{
     AdjustedPhoto, Camera, Image, InnerConstraints, Network, Options, Photo, Point, Solution,
 };
+use photocore::{Context, Threads};
 use serde_json::Value;
 
 use crate::golden::{golden, list, rows};
@@ -122,12 +121,10 @@ fn adjust(network: &Network, datum: Option<&InnerConstraints>) -> Solution {
     let method = Method::Damped(Stop::Fraction(1e-9));
     let adjustment = adjustment::Options { method, ..adjustment::Options::default() };
     let options = Options { adjustment, ..Options::default() };
-    let watch = &mut |_| ControlFlow::Continue(());
+    let context = &mut Context::new(&threads);
     match datum {
-        Some(datum) => {
-            network.adjustment(&options).in_datum(datum).on(&threads).watched(watch).run().unwrap()
-        }
-        None => network.adjustment(&options).on(&threads).watched(watch).run().unwrap(),
+        Some(datum) => network.adjustment(&options).in_datum(datum).run_in(context).unwrap(),
+        None => network.adjustment(&options).run_in(context).unwrap(),
     }
 }
 

@@ -3,10 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stderr)]
 
 use std::collections::HashMap;
-use std::ops::ControlFlow;
 
 use nalgebra::{DMatrix, Matrix6};
-use photocore::Threads;
 use photocore::adjustment::{self, Method, Status, Stop};
 use photocore::geometry::{self, AttitudeNumbers, Matrix3, Perspective, PoseNumbers, RotationSense};
 use photocore::network::mounts::OnFrame;
@@ -15,6 +13,7 @@ use photocore::network::{
     AdjustedObservation, AdjustedPhoto, Camera, Common, CommonKind, Image, Network, Observation, Of, Options,
     Photo, Point, Precision, Solution,
 };
+use photocore::{Context, Threads};
 use serde_json::Value;
 
 use crate::golden::{golden, list, rows};
@@ -119,7 +118,7 @@ fn options() -> Options {
 
 fn adjusted(network: &Network) -> Solution {
     let threads = Threads::new(2).unwrap();
-    let solution = network.adjustment(&options()).on(&threads).run().unwrap();
+    let solution = network.adjustment(&options()).run_in(&mut Context::new(&threads)).unwrap();
     assert_eq!(solution.adjustment.status, Status::Converged);
     assert!(solution.adjustment.iterations.len() <= 10, "{}", solution.adjustment.iterations.len());
     solution
@@ -198,7 +197,6 @@ fn assert_solution(file: &File<'_>, solution: &Solution) {
 /// Compares the cross-cofactors of two blocks of unknowns.
 fn assert_cross_cofactors(file: &File<'_>, solution: &Solution) {
     let threads = Threads::new(2).unwrap();
-    let mut go = |_| ControlFlow::Continue(());
     let of = |name: &str| {
         let index = file.index[name];
         match &name[..5] {
@@ -208,11 +206,12 @@ fn assert_cross_cofactors(file: &File<'_>, solution: &Solution) {
         }
     };
     let options = options();
-    let found = file.network.covariances(&options, &solution.state, None, &threads, &mut go).unwrap();
+    let found =
+        file.network.covariances(&options, &solution.state, None, &mut Context::new(&threads)).unwrap();
     let golden = &file.file["solution"]["cross_cofactors"];
     for (name, expected) in golden.as_object().unwrap() {
         let (a, b) = name.split_once(" | ").unwrap();
-        let own = found.cofactors(&[of(a), of(b)], None, &threads, &mut go).unwrap();
+        let own = found.cofactors(&[of(a), of(b)], None, &mut Context::new(&threads)).unwrap();
         let rows_of = found.width(of(a)).unwrap();
         for (i, row) in rows(expected).iter().enumerate() {
             for (j, expected) in row.iter().enumerate() {
@@ -357,12 +356,12 @@ fn a_rig_with_an_unknown_sensor() {
 
     // The same cofactors by further right-hand sides.
     let threads = Threads::new(2).unwrap();
-    let mut go = |_| ControlFlow::Continue(());
     let photo = frames + file.index["frame3"];
-    let all = file.network.covariances(&options(), &solution.state, None, &threads, &mut go).unwrap();
-    let by_steps = all.cofactors(&[Of::PhotoStep(photo)], None, &threads, &mut go).unwrap();
+    let all =
+        file.network.covariances(&options(), &solution.state, None, &mut Context::new(&threads)).unwrap();
+    let by_steps = all.cofactors(&[Of::PhotoStep(photo)], None, &mut Context::new(&threads)).unwrap();
     assert_cofactors(by_steps.as_slice(), &derived["cofactors"], "derived, by steps");
-    let in_angles = all.cofactors(&[Of::Photo(photo)], None, &threads, &mut go).unwrap();
+    let in_angles = all.cofactors(&[Of::Photo(photo)], None, &mut Context::new(&threads)).unwrap();
     for (k, (a, b)) in in_angles.iter().zip(&own.cofactors).enumerate() {
         let scale = (own.cofactors[k / 6 * 7] * own.cofactors[k % 6 * 7]).sqrt();
         assert!((a - b).abs() < 1e-8 * scale);

@@ -4,15 +4,14 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Debug;
-use std::ops::ControlFlow;
 
 use faer::Mat;
 use faer::linalg::solvers::Solve;
-use photocore::Threads;
 use photocore::normals::{
     Chord, Equations, Factor, FactorOptions, Function, GroupRows, InvertOptions, Layout, LayoutError,
     Ordering, Prior, SelectedInverse, SolveOptions, System, SystemError, Tie,
 };
+use photocore::{Context, Threads};
 use proptest::prelude::*;
 
 /// Dense system of given equations.
@@ -146,10 +145,6 @@ fn threads(count: usize) -> Threads {
     Threads::new(count).unwrap()
 }
 
-fn go(_: usize) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
-
 fn done<T, E: Debug>(result: Result<T, E>) -> T {
     result.unwrap()
 }
@@ -266,13 +261,13 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let threads = threads(2);
     let system = System::new(dense.layout.clone(), ordering).unwrap();
     let layout = system.layout();
-    let factor = done(system.factor(&threads, dense, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(dense, &FactorOptions::default(), &mut Context::new(&threads)));
     assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
-    let solution = done(factor.solve(&threads, dense, &SolveOptions::default(), &mut go));
+    let solution = done(factor.solve(dense, &SolveOptions::default(), &mut Context::new(&threads)));
     let rights = vec![1.0; 11 * layout.unknowns()];
-    let alone = done(system.factor(&threads, dense, &FactorOptions::UNCACHED, &mut go));
-    let written = done(alone.solve(&threads, dense, &SolveOptions::default(), &mut go));
-    let further = done(alone.solve(&threads, dense, &solved_for(&rights), &mut go));
+    let alone = done(system.factor(dense, &FactorOptions::UNCACHED, &mut Context::new(&threads)));
+    let written = done(alone.solve(dense, &SolveOptions::default(), &mut Context::new(&threads)));
+    let further = done(alone.solve(dense, &solved_for(&rights), &mut Context::new(&threads)));
     let cholesky = dense.normal_matrix().llt(faer::Side::Lower).unwrap();
     let ones = cholesky.solve(Mat::<f64>::full(layout.unknowns(), 1, 1.0));
     for (i, value) in further.iter().enumerate() {
@@ -286,12 +281,12 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
         assert_close(written[i], *value, 1e-12 * expected.norm_max(), "solution from the equations");
     }
     let right: Vec<f64> = dense.normal_right().col(0).iter().copied().collect();
-    let again = done(factor.solve(&threads, dense, &solved_for(&right), &mut go));
+    let again = done(factor.solve(dense, &solved_for(&right), &mut Context::new(&threads)));
     for (value, other) in again.iter().zip(&solution) {
         assert_close(*value, *other, 1e-11 * expected.norm_max(), "solution for its right-hand side");
     }
     if factor.has_cached() {
-        let Chord { step: chord, decrease, .. } = done(factor.chord(&threads, dense, &mut go));
+        let Chord { step: chord, decrease, .. } = done(factor.chord(dense, &mut Context::new(&threads)));
         assert_close(decrease, factor.decrease, 1e-11 * factor.decrease, "decrease");
         for (value, other) in chord.iter().zip(&solution) {
             assert_close(*value, *other, 1e-11 * expected.norm_max(), "chord from the same values");
@@ -301,7 +296,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
     let inverse = cholesky.solve(Mat::<f64>::identity(layout.unknowns(), layout.unknowns()));
     compare_columns(dense, &system, &factor, &inverse);
     compare_functions(dense, &system, &factor, &inverse);
-    let found = done(factor.invert(&threads, dense, &InvertOptions::default(), &mut go));
+    let found = done(factor.invert(dense, &InvertOptions::default(), &mut Context::new(&threads)));
     let (cofactors, selected) = (found.cofactors, found.selected);
     compare_blocks(layout, &selected, &inverse);
     let l = layout.local_dim();
@@ -327,7 +322,7 @@ fn compare_with_dense(dense: &Dense, ordering: Ordering) {
 /// from the right-hand side; the rest uses the old factor.
 fn compare_chord(dense: &Dense, factor: &Factor) {
     let there = Dense::new(dense.layout.clone(), 97);
-    let chord = done(factor.chord(&threads(2), &there, &mut go)).step;
+    let chord = done(factor.chord(&there, &mut Context::new(&threads(2)))).step;
     let count = dense.layout.locals() * dense.layout.local_dim();
     let (before, after, right) = (dense.normal_matrix(), there.normal_matrix(), there.normal_right());
     let (right, others) = right.split_at_row(count);
@@ -390,7 +385,7 @@ fn compare_columns(dense: &Dense, system: &System, factor: &Factor, inverse: &Ma
         rights[columns.len() * unknowns + column] = 1.0;
     }
     let threads = threads(2);
-    let solved = done(factor.solve(&threads, dense, &solved_for(&rights), &mut go));
+    let solved = done(factor.solve(dense, &solved_for(&rights), &mut Context::new(&threads)));
     let largest = inverse.norm_max();
     for i in 0..unknowns {
         let mut sum = 0.0;
@@ -422,9 +417,10 @@ fn compare_functions(dense: &Dense, system: &System, factor: &Factor, inverse: &
         (&several, Some(&few)),
         (&several, Some(&vec![])),
     ] {
-        let reduced = done(factor.reduce(&threads, dense, rows, columns.map(Vec::as_slice), &mut go));
+        let reduced =
+            done(factor.reduce(dense, rows, columns.map(Vec::as_slice), &mut Context::new(&threads)));
         assert!(factor.memory_of(&reduced) >= 8 * rows.len() * columns.map_or(rows.len(), Vec::len));
-        let found = done(factor.cofactors_of(&threads, &reduced, &mut go));
+        let found = done(factor.cofactors_of(&reduced, &mut Context::new(&threads)));
         let others = columns.unwrap_or(rows);
         assert_eq!(found.len(), rows.len() * others.len());
         let along = |functions: &[Function]| {
@@ -571,10 +567,10 @@ fn groups_of_held_local_blocks_stand_apart() {
 fn equations_of_a_held_local_block_are_functions() {
     let dense = target(12, 30, 20);
     let (threads, system) = (threads(2), System::new(dense.layout.clone(), Ordering::Auto).unwrap());
-    let factor = done(system.factor(&threads, &dense, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&dense, &FactorOptions::default(), &mut Context::new(&threads)));
     let functions = dense.rows_of(7);
-    let reduced = done(factor.reduce(&threads, &dense, &functions, None, &mut go));
-    let found = done(factor.cofactors_of(&threads, &reduced, &mut go));
+    let reduced = done(factor.reduce(&dense, &functions, None, &mut Context::new(&threads)));
+    let found = done(factor.cofactors_of(&reduced, &mut Context::new(&threads)));
     let count = dense.layout.unknowns();
     let inverse =
         dense.normal_matrix().llt(faer::Side::Lower).unwrap().solve(Mat::<f64>::identity(count, count));
@@ -618,7 +614,7 @@ fn what_a_shared_camera_and_photos_leave_open_is_named() {
         dense.matrix[(row, own)] = dense.matrix[(row, photo)];
     }
     let system = System::new(layout, Ordering::Auto).unwrap();
-    let factor = done(system.factor(&threads(2), &dense, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&dense, &FactorOptions::default(), &mut Context::new(&threads(2))));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.blocks(), vec![vec![5, camera]]);
     assert_eq!(deficiency.unknowns(), vec![vec![photo, own]]);
@@ -641,16 +637,17 @@ fn same_bits_of(dense: &Dense) {
     let run = |count: usize| {
         let threads = threads(count);
         let system = System::new(dense.layout.clone(), Ordering::Auto).unwrap();
-        let factor = done(system.factor(&threads, dense, &FactorOptions::default(), &mut go));
-        let solution = done(factor.solve(&threads, dense, &SolveOptions::default(), &mut go));
-        let more = done(factor.solve(&threads, dense, &solved_for(&rights), &mut go));
-        let alone = done(system.factor(&threads, dense, &FactorOptions::UNCACHED, &mut go));
-        let written = done(alone.solve(&threads, dense, &solved_for(&rights), &mut go));
+        let factor = done(system.factor(dense, &FactorOptions::default(), &mut Context::new(&threads)));
+        let solution = done(factor.solve(dense, &SolveOptions::default(), &mut Context::new(&threads)));
+        let more = done(factor.solve(dense, &solved_for(&rights), &mut Context::new(&threads)));
+        let alone = done(system.factor(dense, &FactorOptions::UNCACHED, &mut Context::new(&threads)));
+        let written = done(alone.solve(dense, &solved_for(&rights), &mut Context::new(&threads)));
         let functions: Vec<Function> =
             (0..dense.layout.unknowns()).step_by(3).map(|unknown| vec![(unknown, 1.0)]).collect();
-        let reduced = done(factor.reduce(&threads, dense, &functions, None, &mut go));
-        let of_functions = done(factor.cofactors_of(&threads, &reduced, &mut go));
-        let cofactors = done(factor.invert(&threads, dense, &InvertOptions::default(), &mut go)).cofactors;
+        let reduced = done(factor.reduce(dense, &functions, None, &mut Context::new(&threads)));
+        let of_functions = done(factor.cofactors_of(&reduced, &mut Context::new(&threads)));
+        let cofactors =
+            done(factor.invert(dense, &InvertOptions::default(), &mut Context::new(&threads))).cofactors;
         let numbers =
             [solution, more, written, of_functions, cofactors.local, cofactors.retained, cofactors.equations];
         numbers.concat().into_iter().map(f64::to_bits).collect::<Vec<u64>>()
@@ -671,7 +668,7 @@ fn what_the_equations_do_not_determine_is_named() {
         dense.matrix[(row, range.start + 4)] = dense.matrix[(row, range.start + 1)];
     }
     let system = System::new(layout, Ordering::ReverseCuthillMckee).unwrap();
-    let factor = done(system.factor(&threads(2), &dense, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&dense, &FactorOptions::default(), &mut Context::new(&threads(2))));
     let deficiency = factor.deficiency().unwrap();
     assert_eq!(deficiency.blocks(), vec![vec![3]]);
 }
@@ -713,7 +710,7 @@ fn many_doubtful_pivots_are_told_from_lost_ones() {
     let system = System::new(layout, Ordering::Auto).unwrap();
     for count in [1, 3] {
         let options = FactorOptions::default();
-        let factor = done(system.factor(&threads(count), &chains_of, &options, &mut go));
+        let factor = done(system.factor(&chains_of, &options, &mut Context::new(&threads(count))));
         let mut found = factor.deficiency().unwrap().blocks();
         found.sort();
         assert_eq!(found, expected);
@@ -726,7 +723,7 @@ fn local_block_without_equations_is_named() {
     let mut dense = Dense::new(layout.clone(), 5);
     dense.prior.weight[layout.local_range(1)].fill(0.0);
     let system = System::new(layout, Ordering::Auto).unwrap();
-    let factor = done(system.factor(&threads(1), &dense, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&dense, &FactorOptions::default(), &mut Context::new(&threads(1))));
     assert_eq!(factor.deficient_locals, vec![1]);
 }
 
@@ -778,7 +775,7 @@ fn slices_of_other_lengths_are_refused() {
     let dense = block(1, 3, 0);
     let system = System::new(dense.layout.clone(), Ordering::Auto).unwrap();
     let (threads, unknowns) = (threads(1), dense.layout.unknowns());
-    let factor = |of: &Dense| system.factor(&threads, of, &FactorOptions::default(), &mut go);
+    let factor = |of: &Dense| system.factor(of, &FactorOptions::default(), &mut Context::new(&threads));
     let length =
         |field, length, required| SystemError::Layout(LayoutError::Length { field, length, required });
     let [mut short, mut long] = [0; 2].map(|seed| block(1, 3, seed));
@@ -787,19 +784,19 @@ fn slices_of_other_lengths_are_refused() {
     assert_eq!(factor(&short).unwrap_err(), length("Prior::weight", unknowns - 1, unknowns));
     assert_eq!(factor(&long).unwrap_err(), length("Prior::right", unknowns + 1, unknowns));
     let formed = factor(&dense).unwrap();
-    let solve = |of: &Dense, options| formed.solve(&threads, of, &options, &mut go);
+    let solve = |of: &Dense, options| formed.solve(of, &options, &mut Context::new(&threads));
     let refused = solve(&short, SolveOptions::default()).unwrap_err();
     assert_eq!(refused, length("Prior::weight", unknowns - 1, unknowns));
     for count in [1, unknowns - 1, 2 * unknowns + 1] {
         let expected = LayoutError::Columns { field: "SolveOptions::rights", length: count, unknowns };
         let rights = vec![0.0; count];
-        let refused = formed.solve(&threads, &dense, &solved_for(&rights), &mut go);
+        let refused = formed.solve(&dense, &solved_for(&rights), &mut Context::new(&threads));
         assert_eq!(refused.unwrap_err(), SystemError::Layout(expected));
     }
     let outer = SolveOptions { outer: &[0.0], ..SolveOptions::default() };
     assert_eq!(solve(&dense, outer).unwrap_err(), length("SolveOptions::outer", 1, 0));
     let options = InvertOptions::default();
-    let refused = formed.invert(&threads, &short, &options, &mut go).unwrap_err();
+    let refused = formed.invert(&short, &options, &mut Context::new(&threads)).unwrap_err();
     assert_eq!(refused, length("Prior::weight", unknowns - 1, unknowns));
 }
 
@@ -813,9 +810,9 @@ fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
     let inverted = |layout: Layout| {
         let system = System::new(layout, Ordering::Input).unwrap();
         let factoring = FactorOptions::default();
-        let factor = done(system.factor(&threads(1), &dense, &factoring, &mut go));
+        let factor = done(system.factor(&dense, &factoring, &mut Context::new(&threads(1))));
         let options = InvertOptions::default();
-        (done(factor.invert(&threads(1), &dense, &options, &mut go)), system)
+        (done(factor.invert(&dense, &options, &mut Context::new(&threads(1)))), system)
     };
     let (found, _) = inverted(dense.layout.clone());
     let outside = LayoutError::Block { row: 0, column: 19 };
@@ -834,9 +831,9 @@ fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
     let groups: Vec<u32> = (0..count).map(|group| dense.layout.retained_of(group) as u32).collect();
     let apart = Dense::new(Layout::new(2, 3, &[6; 20], (0..=count).collect(), groups).unwrap(), 3);
     let system = System::new(apart.layout.clone(), Ordering::Input).unwrap();
-    let factor = done(system.factor(&threads(1), &apart, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(&apart, &FactorOptions::default(), &mut Context::new(&threads(1))));
     let options = InvertOptions::default();
-    let foreign = done(factor.invert(&threads(1), &apart, &options, &mut go)).selected;
+    let foreign = done(factor.invert(&apart, &options, &mut Context::new(&threads(1)))).selected;
     let (_, whole) = inverted(dense.layout.clone());
     let rows = dense.rows_of(0);
     let refused = whole.local_cofactors(&foreign, (&rows, &dense.prior.weight), &rows, 0);

@@ -6,7 +6,6 @@ use faer::linalg::solvers::DenseSolveCore;
 use faer::prelude::Solve;
 use faer::{Mat, Side};
 use num_complex::Complex64 as C;
-use photocore::Threads;
 use photocore::adjustment::{self, Loss, Method, Status, Stop};
 use photocore::geometry::{
     self, AttitudeNumbers, Matrix3, ObjectSpace, Perspective, Pose, PoseNumbers, RotationSense, Vector3,
@@ -21,6 +20,7 @@ use photocore::network::{
     Camera, Common, CommonKind, Dropped, Image, Mount, Network, NetworkError, Observation, Options, Photo,
     Point, Precision, Reason, Solution,
 };
+use photocore::{Context, Threads};
 
 use crate::scatter;
 
@@ -382,7 +382,7 @@ fn options(method: Method, loss: Option<Loss>) -> Options {
 
 fn adjust_with(network: &Network, options: &Options, threads: usize) -> Result<Solution, NetworkError> {
     let threads = Threads::new(threads).unwrap();
-    network.adjustment(options).on(&threads).run()
+    network.adjustment(options).run_in(&mut Context::new(&threads))
 }
 
 fn adjusted(network: &Network) -> Solution {

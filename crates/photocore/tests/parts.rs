@@ -4,15 +4,14 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Debug;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 
 use crate::cut::{Cut, TREES};
-use photocore::Threads;
 use photocore::normals::{
     Chord, Contribution, Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, LayoutError,
     Ordering, Prior, ReducedRights, SolveOptions, System, Tie,
 };
+use photocore::{Context, Threads};
 use proptest::prelude::*;
 
 /// Returns a number between -1 and 1, determined by a seed and two indices.
@@ -161,10 +160,6 @@ fn threads(count: usize) -> Threads {
     Threads::new(count).unwrap()
 }
 
-fn go(_: usize) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
-
 fn done<T, E: Debug>(result: Result<T, E>) -> T {
     result.unwrap()
 }
@@ -182,7 +177,7 @@ fn upward<'a>(
         let mut piece = piece(all, cut, p);
         piece.below = cut.children(p).iter().map(|&child| left[child].take().unwrap()).collect();
         let system = System::new(piece.layout.clone(), ordering).unwrap();
-        let mut factor = done(system.factor(threads, &piece, &FactorOptions::default(), &mut go));
+        let mut factor = done(system.factor(&piece, &FactorOptions::default(), &mut Context::new(threads)));
         assert!(factor.deficient_locals.is_empty() && factor.deficiency().is_none());
         let contribution = factor.take_contribution();
         let outer = system.symbolic().outer_unknowns();
@@ -233,7 +228,7 @@ fn reduced(
             }
         }
         let of = piece as &dyn Equations;
-        let reduced = done(factor.reduce_rights(threads, of, &here, &mut go));
+        let reduced = done(factor.reduce_rights(of, &here, &mut Context::new(threads)));
         products.iter_mut().zip(&reduced.products).for_each(|(sum, value)| *sum += value);
         found.push(reduced);
     }
@@ -244,9 +239,9 @@ fn reduced(
 fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threads) {
     let (system, count) = (System::new(all.layout.clone(), ordering).unwrap(), all.layout.unknowns());
     let rights: Vec<f64> = (0..COLUMNS * count).map(|i| number(all.seed, i, 17)).collect();
-    let factor = done(system.factor(threads, all, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(all, &FactorOptions::default(), &mut Context::new(threads)));
     let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
-    let expected = done(factor.solve(threads, all, &options, &mut go));
+    let expected = done(factor.solve(all, &options, &mut Context::new(threads)));
     let largest = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let nodes = upward(all, cut, ordering, threads);
     let (mut found, products) = reduced(&rights, (all, cut, &nodes), threads);
@@ -260,7 +255,7 @@ fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Thre
         let (own, names) = (system.layout(), unknowns_of(all, &piece));
         let (of, outer) = (&piece as &dyn Equations, std::mem::take(&mut handed[p]));
         let reduced = found.remove(p);
-        let x = done(factor.solve_reduced_rights(threads, of, reduced, &outer, &mut go));
+        let x = done(factor.solve_reduced_rights(of, reduced, &outer, &mut Context::new(threads)));
         for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
             let of_column = |column: &[f64]| own.unknowns_of(blocks).map(|at| column[at]).collect::<Vec<_>>();
             handed[child] = x.chunks_exact(names.len().max(1)).flat_map(of_column).collect();
@@ -276,10 +271,10 @@ fn compare_rights(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Thre
 fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threads) {
     let elsewhere = whole(all.layout.clone(), all.seed.wrapping_add(1));
     let system = System::new(all.layout.clone(), ordering).unwrap();
-    let factor = done(system.factor(threads, all, &FactorOptions::default(), &mut go));
+    let factor = done(system.factor(all, &FactorOptions::default(), &mut Context::new(threads)));
     assert!(factor.has_cached());
     let of = &elsewhere as &dyn Equations;
-    let Chord { step: expected, decrease, .. } = done(factor.chord(threads, of, &mut go));
+    let Chord { step: expected, decrease, .. } = done(factor.chord(of, &mut Context::new(threads)));
     let largest = expected.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
     let nodes = upward(all, cut, ordering, threads);
     let mut found: Vec<(Piece<'_>, ReducedRights<1>)> = vec![];
@@ -291,7 +286,7 @@ fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threa
             own.unknowns_of(blocks).zip(left).for_each(|(unknown, value)| rights[unknown] += value);
         }
         let of = &piece as &dyn Equations;
-        let reduced = done(factor.reduce_chord(threads, of, &rights, &mut go));
+        let reduced = done(factor.reduce_chord(of, &rights, &mut Context::new(threads)));
         found.push((piece, reduced));
     }
     let sum: f64 = found.iter().map(|(_, reduced)| reduced.products[0]).sum();
@@ -300,7 +295,7 @@ fn compare_chord(all: &Piece<'_>, cut: &Cut, ordering: Ordering, threads: &Threa
     for (p, (piece, system, factor)) in nodes.into_iter().enumerate().rev() {
         let (own, outer) = (system.layout(), std::mem::take(&mut handed[p]));
         let (of, (_, reduced)) = (&piece as &dyn Equations, found.remove(p));
-        let chord = done(factor.solve_reduced_rights(threads, of, reduced, &outer, &mut go));
+        let chord = done(factor.solve_reduced_rights(of, reduced, &outer, &mut Context::new(threads)));
         for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
             handed[child] = own.unknowns_of(blocks).map(|unknown| chord[unknown]).collect();
         }
@@ -316,10 +311,10 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
     let cut = Cut::new(tree, &touched(&layout), node_of);
     let all = whole(layout, seed);
     let system = System::new(all.layout.clone(), ordering).unwrap();
-    let factor = done(system.factor(&threads, &all, &FactorOptions::default(), &mut go));
-    let expected = done(factor.solve(&threads, &all, &SolveOptions::default(), &mut go));
+    let factor = done(system.factor(&all, &FactorOptions::default(), &mut Context::new(&threads)));
+    let expected = done(factor.solve(&all, &SolveOptions::default(), &mut Context::new(&threads)));
     let (sum, decrease) = (factor.sum_of_squares, factor.decrease);
-    let cofactors = done(factor.invert(&threads, &all, &InvertOptions::default(), &mut go));
+    let cofactors = done(factor.invert(&all, &InvertOptions::default(), &mut Context::new(&threads)));
     compare_rights(&all, &cut, ordering, &threads);
     compare_chord(&all, &cut, ordering, &threads);
     let nodes = upward(&all, &cut, ordering, &threads);
@@ -336,20 +331,18 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
     for (p, (piece, system, factor)) in nodes.into_iter().enumerate().rev() {
         let (outer_step, outer_cofactors) = std::mem::take(&mut handed[p]);
         let step = done(factor.solve(
-            &threads,
             &piece,
             &SolveOptions { outer: &outer_step, ..SolveOptions::default() },
-            &mut go,
+            &mut Context::new(&threads),
         ));
         let own = system.layout();
         for (x, unknown) in step.iter().zip(unknowns_of(&all, &piece)) {
             assert_close(*x, expected[unknown], 1e-9 * largest, "solution");
         }
         let found = done(factor.invert(
-            &threads,
             &piece,
             &InvertOptions { outer: &outer_cofactors, ..InvertOptions::default() },
-            &mut go,
+            &mut Context::new(&threads),
         ));
         for (child, blocks) in cut.children(p).into_iter().zip(own.contributions()) {
             let outer_step = own.unknowns_of(blocks).map(|unknown| step[unknown]).collect();
@@ -475,7 +468,8 @@ fn bits_of_a_node_do_not_depend_on_the_number_of_threads() {
         for p in 0..2 {
             let piece = piece(&all, &cut, p);
             let system = System::new(piece.layout.clone(), Ordering::Auto).unwrap();
-            let mut factor = done(system.factor(&threads, &piece, &FactorOptions::default(), &mut go));
+            let mut factor =
+                done(system.factor(&piece, &FactorOptions::default(), &mut Context::new(&threads)));
             let Contribution { matrix, right, diagonal } = factor.take_contribution();
             numbers.extend([matrix, right, diagonal].concat());
             assert!(factor.take_contribution().matrix.is_empty(), "handed out once");

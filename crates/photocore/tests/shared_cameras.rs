@@ -14,7 +14,7 @@ use photocore::network::observations::Distance;
 use photocore::network::{
     Camera, Combination, Image, Network, NetworkError, Of, Options, Photo, Point, PosePart, Solution,
 };
-use photocore::{Stopped, Threads};
+use photocore::{Context, Stopped, Threads};
 
 use crate::scatter;
 
@@ -165,7 +165,7 @@ fn options(method: Method) -> Options {
 
 fn adjust(network: &Network, method: Method) -> Result<Solution, NetworkError> {
     let threads = Threads::new(2).unwrap();
-    network.adjustment(&options(method)).on(&threads).run()
+    network.adjustment(&options(method)).run_in(&mut Context::new(&threads))
 }
 
 /// The same network with full matrices: poses, parameters of all cameras, points; fixed unknowns have a separate equation.
@@ -348,10 +348,9 @@ fn shared_cameras_are_those_of_an_adjustment_with_full_matrices() {
 fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
     let network = network();
     let options = options(TIGHT);
-    let mut go = |_| ControlFlow::Continue(());
     let in_threads = |threads: usize| Threads::new(threads).unwrap();
     let threads = in_threads(2);
-    let solution = network.adjustment(&options).on(&threads).watched(&mut go).run().unwrap();
+    let solution = network.adjustment(&options).run_in(&mut Context::new(&threads)).unwrap();
     let dense = Dense::new(&network);
     let (_, q) = dense.adjust();
     let (_, sd) = dense.observed();
@@ -366,8 +365,9 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
         };
         of.iter().flat_map(own).collect()
     };
-    let covariances = network.covariances(&options, &solution.state, None, &threads, &mut go).unwrap();
-    let all = covariances.cofactors(&of, None, &threads, &mut go).unwrap();
+    let covariances =
+        network.covariances(&options, &solution.state, None, &mut Context::new(&threads)).unwrap();
+    let all = covariances.cofactors(&of, None, &mut Context::new(&threads)).unwrap();
     let compare = |found: &DMatrix<f64>, rows: &[usize], columns: &[usize]| {
         assert_eq!(found.shape(), (rows.len(), columns.len()));
         for (k, value) in found.iter().enumerate() {
@@ -380,8 +380,8 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
     compare(&all, &unknowns(&of), &unknowns(&of));
     // Bit-identical results for any number of threads.
     let one = in_threads(1);
-    let again = network.covariances(&options, &solution.state, None, &one, &mut go).unwrap();
-    let again = again.cofactors(&of, None, &one, &mut go).unwrap();
+    let again = network.covariances(&options, &solution.state, None, &mut Context::new(&one)).unwrap();
+    let again = again.cofactors(&of, None, &mut Context::new(&one)).unwrap();
     assert!(all.iter().zip(&again).all(|(a, b)| a.to_bits() == b.to_bits()));
     // Cross-cofactors: one camera and all unknowns, all unknowns and one camera, some points and others.
     for (rows, columns) in [
@@ -389,7 +389,7 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
         (of.clone(), vec![Of::Camera(1)]),
         (vec![Of::Point(4), Of::Point(30)], vec![Of::Point(30), Of::Photo(7), Of::Point(5)]),
     ] {
-        let found = covariances.cofactors(&rows, Some(&columns), &threads, &mut go).unwrap();
+        let found = covariances.cofactors(&rows, Some(&columns), &mut Context::new(&threads)).unwrap();
         compare(&found, &unknowns(&rows), &unknowns(&columns));
     }
     // A distance as a function of two points.
@@ -398,7 +398,7 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
     let length = (0..3).map(|k| (r[k] - p[k]).powi(2)).sum::<f64>().sqrt();
     let direction: Vec<f64> = (0..3).map(|k| (r[k] - p[k]) / length).collect();
     let partials: Vec<f64> = direction.iter().map(|d| -d).chain(direction.iter().copied()).collect();
-    let found = covariances.propagate(&partials, &ends, &threads, &mut go).unwrap();
+    let found = covariances.propagate(&partials, &ends, &mut Context::new(&threads)).unwrap();
     let places = unknowns(&ends);
     let pairs = (0..6).flat_map(|i| (0..6).map(move |j| (i, j)));
     let expected: f64 = pairs.map(|(i, j)| partials[i] * q[(places[i], places[j])] * partials[j]).sum();
@@ -408,29 +408,32 @@ fn cofactors_of_anything_with_anything_are_those_of_full_matrices() {
 #[test]
 fn what_has_no_cofactors_is_refused() {
     let network = network();
-    let mut go = |_| ControlFlow::Continue(());
     let threads = Threads::new(1).unwrap();
     let options = Options { memory: Some(1 << 30), ..options(TIGHT) };
-    let solution = network.adjustment(&options).on(&threads).watched(&mut go).run().unwrap();
-    let covariances = network.covariances(&options, &solution.state, None, &threads, &mut go).unwrap();
-    let mut refused = |of: Of| covariances.cofactors(&[of], None, &threads, &mut go).unwrap_err();
+    let solution = network.adjustment(&options).run_in(&mut Context::new(&threads)).unwrap();
+    let covariances =
+        network.covariances(&options, &solution.state, None, &mut Context::new(&threads)).unwrap();
+    let refused = |of: Of| covariances.cofactors(&[of], None, &mut Context::new(&threads)).unwrap_err();
     assert_eq!(refused(Of::Photo(PHOTOS)), NetworkError::NoPhoto(PHOTOS));
     assert_eq!(refused(Of::Point(POINTS)), NetworkError::NoPoint(POINTS));
     let cameras = network.cameras.len();
     assert_eq!(refused(Of::Camera(cameras)), NetworkError::CameraIndex(cameras));
-    let partials = covariances.propagate(&[1.0; 4], &[Of::Point(0)], &threads, &mut go).unwrap_err();
+    let partials =
+        covariances.propagate(&[1.0; 4], &[Of::Point(0)], &mut Context::new(&threads)).unwrap_err();
     assert_eq!(partials, NetworkError::Partials { unknowns: 3, numbers: 4 });
     let many = vec![Of::Point(0); 4000];
-    let too_many = covariances.cofactors(&many, None, &threads, &mut go).unwrap_err();
+    let too_many = covariances.cofactors(&many, None, &mut Context::new(&threads)).unwrap_err();
     let NetworkError::Cofactors(CofactorError::Memory { needed, .. }) = too_many else {
         panic!("{too_many:?}");
     };
     assert!(needed > 8 * 12_000 * 12_000);
-    let stopped = covariances.cofactors(&[Of::Point(0)], None, &threads, &mut |_| ControlFlow::Break(()));
+    let mut stop = |_| ControlFlow::Break(());
+    let stopping = &mut Context::with_progress(&threads, &mut stop);
+    let stopped = covariances.cofactors(&[Of::Point(0)], None, stopping);
     assert_eq!(stopped.unwrap_err(), NetworkError::Stopped(Stopped::Interrupted));
     let mut other = solution.state;
     other.unknowns.pop();
-    let found = network.covariances(&options, &other, None, &threads, &mut go).err();
+    let found = network.covariances(&options, &other, None, &mut Context::new(&threads)).err();
     assert_eq!(found, Some(NetworkError::State));
 }
 

@@ -2,15 +2,13 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use std::ops::ControlFlow;
-
 use faer::{Mat, Side};
-use photocore::Threads;
 use photocore::adjustment::{
     Datum, DatumError, Evaluated, Leverages, Linearized, Loss, Method, Model, Motions, Options, Problem,
     Published, Status, Stop, adjust,
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System, Tie};
+use photocore::{Context, Threads};
 
 use crate::scatter;
 
@@ -119,10 +117,6 @@ fn options() -> Options {
     Options { method: Method::TrustRegion(Stop::Decrease(1e-14)), ..Options::default() }
 }
 
-fn go<T>(_: T) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
-
 /// Returns the design matrix divided by the standard deviations, at the given values.
 fn design(problem: &Problem<Trilateration>, values: &[f64]) -> Mat<f64> {
     let layout = problem.layout();
@@ -175,12 +169,12 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
     // One point and the direction to another are fixed.
     let problem = network(vec![16, 17, 19]);
     let threads = threads();
-    let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
+    let mut found = adjust(&problem, &options(), &mut Context::new(&threads)).unwrap();
     assert_eq!(found.status, Status::Converged);
     let (redundancy, formed) = (found.redundancy.take().unwrap(), found.effort.formations);
     let all = (0..problem.layout().unknowns()).map(|unknown| (unknown, 1.0)).collect();
     let datum = Datum { carriers: all, left: vec![], relative: false };
-    found.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go).unwrap();
+    found.take_to(&problem, &options(), &datum, &problem.initial, &mut Context::new(&threads)).unwrap();
     assert_eq!(found.effort.formations, formed + 1);
     let (free, cofactors) = (&found, found.cofactors.as_ref().unwrap());
     let a = design(&problem, &free.unknowns);
@@ -219,9 +213,9 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
 
     // Without cofactors only the unknowns are transformed, without a factorization.
     let bare = Options { covariance: false, ..options() };
-    let mut moved = adjust(&problem, &bare, &threads, &mut go).unwrap();
+    let mut moved = adjust(&problem, &bare, &mut Context::new(&threads)).unwrap();
     let formations = moved.effort.formations;
-    moved.take_to(&problem, &bare, &datum, &problem.initial, &threads, &mut go).unwrap();
+    moved.take_to(&problem, &bare, &datum, &problem.initial, &mut Context::new(&threads)).unwrap();
     assert!(moved.cofactors.is_none() && moved.redundancy.is_none());
     assert_eq!(moved.effort.formations, formations);
     let apart = moved.unknowns.iter().zip(&free.unknowns).map(|(x, other)| (x - other).abs());
@@ -233,14 +227,14 @@ fn a_datum_does_not_depend_on_where_the_network_comes_from() {
     let threads = threads();
     let in_datum_of = |held: Vec<usize>| {
         let problem = network(held);
-        let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
+        let mut found = adjust(&problem, &options(), &mut Context::new(&threads)).unwrap();
         // Datum of three retained points.
         let datum = Datum {
             carriers: (20..26).map(|unknown| (unknown, 1.0)).collect(),
             left: vec![],
             relative: false,
         };
-        found.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go).unwrap();
+        found.take_to(&problem, &options(), &datum, &problem.initial, &mut Context::new(&threads)).unwrap();
         found.cofactors.unwrap()
     };
     let one = in_datum_of(vec![16, 17, 19]);
@@ -255,12 +249,13 @@ fn a_datum_does_not_depend_on_where_the_network_comes_from() {
 fn too_few_carriers_are_refused() {
     let problem = network(vec![16, 17, 19]);
     let threads = threads();
-    let mut found = adjust(&problem, &options(), &threads, &mut go).unwrap();
+    let mut found = adjust(&problem, &options(), &mut Context::new(&threads)).unwrap();
     // One point defines shifts, but not a rotation about itself; one coordinate of four points does not define the shift along the other.
     for carriers in [vec![16, 17], vec![16, 18, 20, 22]] {
         let carriers = carriers.into_iter().map(|unknown| (unknown, 1.0)).collect();
         let datum = Datum { carriers, left: vec![], relative: false };
-        let refused = found.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go);
+        let refused =
+            found.take_to(&problem, &options(), &datum, &problem.initial, &mut Context::new(&threads));
         assert_eq!(refused.unwrap_err(), DatumError::NotCarried);
     }
 }
@@ -271,7 +266,7 @@ fn what_is_open_is_found_by_trying_and_held() {
     let adjusted = |change: &dyn Fn(&mut Problem<Trilateration>), method: Method| {
         let mut problem = network(vec![16, 17, 19]);
         change(&mut problem);
-        (adjust(&problem, &Options { method, ..options() }, &threads, &mut go).unwrap(), problem)
+        (adjust(&problem, &Options { method, ..options() }, &mut Context::new(&threads)).unwrap(), problem)
     };
     for method in [
         Method::default(),
@@ -296,7 +291,8 @@ fn what_is_open_is_found_by_trying_and_held() {
             left: vec![],
             relative: false,
         };
-        let refused = placed.take_to(&problem, &options(), &datum, &problem.initial, &threads, &mut go);
+        let refused =
+            placed.take_to(&problem, &options(), &datum, &problem.initial, &mut Context::new(&threads));
         assert_eq!(refused.unwrap_err(), DatumError::NotFree);
     }
 }
@@ -307,7 +303,7 @@ fn a_loss_takes_the_weight_of_a_wrong_tie() {
     let wrong = problem.layout().groups() + 5;
     problem.model.lengths[wrong] += 3.0;
     let robust = Options { loss: Some(Loss::Huber(1.5)), covariance: false, ..options() };
-    let found = adjust(&problem, &robust, &threads(), &mut go).unwrap();
+    let found = adjust(&problem, &robust, &mut Context::new(&threads())).unwrap();
     let weights = found.weights.unwrap();
     assert_eq!(weights.len(), 32 + 36);
     let least = (0..weights.len()).min_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap();
@@ -324,9 +320,10 @@ fn excluded_observations_may_not_be_finite() {
             problem.observation_sd[excluded] = f64::INFINITY;
             problem.model.lengths[excluded] = length;
         }
-        let found = adjust(&problem, &Options { method, loss, ..options() }, &threads, &mut go).unwrap();
+        let found =
+            adjust(&problem, &Options { method, loss, ..options() }, &mut Context::new(&threads)).unwrap();
         let (values, held) = (found.unknowns.clone(), found.datum.clone());
-        let leverages = Leverages::at(&problem, values, held, &threads, &mut go).unwrap();
+        let leverages = Leverages::at(&problem, values, held, &mut Context::new(&threads)).unwrap();
         let of_point = leverages
             .of_locals(&problem, (&problem.observation_sd, None), &[1], (|_| vec![], None), &threads)
             .unwrap();
@@ -357,11 +354,11 @@ fn excluded_observations_may_not_be_finite() {
 #[test]
 fn equations_of_ties_have_the_cofactors_of_solutions() {
     let (problem, threads) = (network(vec![]), threads());
-    let adjusted = adjust(&problem, &Options::default(), &threads, &mut go).unwrap();
+    let adjusted = adjust(&problem, &Options::default(), &mut Context::new(&threads)).unwrap();
     let (values, held) = (adjusted.unknowns, adjusted.datum);
-    let leverages = Leverages::at(&problem, values.clone(), held.clone(), &threads, &mut go).unwrap();
-    let mut go_on = |_| ControlFlow::Continue(());
-    let linearized = Linearized::form(&problem, None, values, held, &threads, &mut go_on).unwrap();
+    let leverages =
+        Leverages::at(&problem, values.clone(), held.clone(), &mut Context::new(&threads)).unwrap();
+    let linearized = Linearized::form(&problem, None, values, held, &mut Context::new(&threads)).unwrap();
     let layout = problem.layout();
     let ties: Vec<usize> = (0..layout.ties().len()).collect();
     for rows in leverages.rows_of_ties(&problem, &problem.observation_sd, &ties, &threads) {
@@ -371,7 +368,7 @@ fn equations_of_ties_have_the_cofactors_of_solutions() {
             dense
         };
         let rights: Vec<f64> = rows.iter().flat_map(dense).collect();
-        let solved = linearized.solve_for(&problem, &rights, &threads, &mut go_on).unwrap();
+        let solved = linearized.solve_for(&problem, &rights, &mut Context::new(&threads)).unwrap();
         let found = leverages.of_rows(layout, &rows).unwrap();
         for (k, value) in found.equations.iter().enumerate() {
             let column = &solved[k % rows.len() * layout.unknowns()..][..layout.unknowns()];
@@ -386,13 +383,10 @@ fn equations_of_ties_have_the_cofactors_of_solutions() {
 #[test]
 fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say() {
     let (problem, threads) = (network(vec![]), threads());
-    let mut go_on = |_| ControlFlow::Continue(());
-    let adjusted =
-        adjust(&problem, &Options::default(), &threads, &mut |_| ControlFlow::Continue(())).unwrap();
+    let adjusted = adjust(&problem, &Options::default(), &mut Context::new(&threads)).unwrap();
     let (values, held) = (adjusted.unknowns.clone(), adjusted.datum.clone());
     let leverages =
-        Leverages::at(&problem, values.clone(), held.clone(), &threads, &mut |_| ControlFlow::Continue(()))
-            .unwrap();
+        Leverages::at(&problem, values.clone(), held.clone(), &mut Context::new(&threads)).unwrap();
     let local = 3;
     let layout = problem.layout();
     // The rows of the point, over all unknowns, for unit weight; fixed unknowns have zero columns.
@@ -408,8 +402,8 @@ fn observations_of_one_point_take_up_together_what_further_right_hand_sides_say(
         row
     };
     let rows: Vec<Vec<f64>> = layout.groups_of(local).map(row).collect();
-    let linearized = Linearized::form(&problem, None, values, held, &threads, &mut go_on).unwrap();
-    let solved = linearized.solve_for(&problem, &rows.concat(), &threads, &mut go_on).unwrap();
+    let linearized = Linearized::form(&problem, None, values, held, &mut Context::new(&threads)).unwrap();
+    let solved = linearized.solve_for(&problem, &rows.concat(), &mut Context::new(&threads)).unwrap();
     let sd = &problem.observation_sd;
     let found = leverages.of_locals(&problem, (sd, None), &[local, 0], (|_| vec![], None), &threads).unwrap();
     let blocks: Vec<Vec<f64>> = found.into_iter().map(|own| own.equations).collect();

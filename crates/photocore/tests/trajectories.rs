@@ -2,7 +2,6 @@
 
 #![allow(clippy::unwrap_used)]
 
-use photocore::Threads;
 use photocore::adjustment::Status;
 use photocore::geometry::trajectory::{
     Attitudes, Axes, Basis, Interpolation, Polynomial, Positions, Rotations, Trajectory as Course,
@@ -16,6 +15,7 @@ use photocore::network::{
     Camera, Combination, Common, CommonKind, Image, Network, NetworkError, Options, Photo, Point, Solution,
     Trajectory,
 };
+use photocore::{Context, Threads};
 
 const CAMERA: Perspective = Perspective { principal_distance: -28.0 };
 const SENSE: RotationSense = RotationSense::GroundToPhoto;
@@ -147,7 +147,7 @@ fn network(seed: u64) -> Network {
 
 fn adjust(network: &Network) -> Result<Solution, NetworkError> {
     let threads = Threads::new(1).unwrap();
-    network.adjustment(&Options::default()).on(&threads).run()
+    network.adjustment(&Options::default()).run_in(&mut Context::new(&threads))
 }
 
 #[test]

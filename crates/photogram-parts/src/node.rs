@@ -8,15 +8,15 @@
 //! [`Contribution`] to its parent. From the step and cofactors of the outer parameters it then computes those for the inner ones. The root
 //! has zero outer parameters.
 
-use photocore::Threads;
-use photocore::adjustment::{AdjustError, Adjustment, AnyProblem, Counts, Linearized, Phase, Watch};
-use photocore::internal::{Assembled, ObservationEquations, Reweighting, between};
+use photocore::adjustment::{AdjustError, Adjustment, AnyProblem, Counts, Linearized};
+use photocore::internal::{Assembled, ObservationEquations, Reweighting};
 use photocore::network::{
     Dropped, Image, Network, NetworkError, Options, Point, Solution, SumsByType, Surroundings,
 };
 use photocore::normals::{
     Contribution, Equations, FactorOptions, InvertOptions, Operations, ReducedRights, SolveOptions, packed,
 };
+use photocore::{Context, Threads};
 
 use crate::datum::{DatumOfPart, UnknownName};
 use crate::interface::{check_blocks, release, with_coefficients};
@@ -217,8 +217,7 @@ impl Node {
         state: &[f64],
         contributions: &[Contribution<'_>],
         (damping, curved): (f64, bool),
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<FormedNode, NetworkError> {
         self.check(&[state])?;
         let fit = |(given, places): (&Contribution<'_>, &Vec<usize>)| given.is_over(places.len());
@@ -226,15 +225,14 @@ impl Node {
         require(all && contributions.iter().zip(&self.below).all(fit))?;
         let (problem, loss) = (self.problem(), self.options.adjustment.loss);
         let reweighting = loss.map(|loss| Reweighting { loss, curved });
-        let equations = ObservationEquations::new(problem, reweighting, state, &self.held, threads)
+        let equations = ObservationEquations::new(problem, reweighting, state, &self.held, context.threads)
             .with_contributions(contributions);
         let options = FactorOptions { damping, ..FactorOptions::default() };
-        let mut between = between(watch, Phase::Form, problem.layout().locals());
         let (values, held) = (state.to_vec(), self.held.clone());
-        let formed = Linearized::of(&equations, values, held, &options, threads, &mut between);
+        let formed = Linearized::of(&equations, values, held, &options, context);
         let mut linearized = formed.map_err(|error| self.named(error))?;
         if loss.is_some() {
-            let residuals = problem.residuals_at(threads, equations.at());
+            let residuals = problem.residuals_at(context.threads, equations.at());
             linearized.sum_of_squares = problem.objective(state, &residuals, loss);
         }
         // The factor is stored until back-substitution, possibly with many others.
@@ -255,14 +253,12 @@ impl Node {
         &self,
         formed: &FormedNode,
         outer: &[f64],
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
         require(outer.len() == self.outer.len())?;
-        let equations = formed.linearized.equations(self.problem(), threads);
-        let mut between = between(watch, Phase::Solve, self.problem().layout().locals());
+        let equations = formed.linearized.equations(self.problem(), context.threads);
         let options = SolveOptions { outer, ..SolveOptions::default() };
-        let step = formed.linearized.solve(&equations, &options, threads, &mut between);
+        let step = formed.linearized.solve(&equations, &options, context);
         step.map_err(|error| self.named(error))
     }
 
@@ -280,8 +276,7 @@ impl Node {
         outer: &[f64],
         state: &[f64],
         datum: Option<DatumOfPart<'_>>,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<(Solution, Vec<Vec<f64>>), NetworkError> {
         self.check(&[state])?;
         if !datum.as_ref().is_none_or(|datum| datum.is_over(self.size())) {
@@ -296,10 +291,9 @@ impl Node {
         let (problem, loss) = (self.problem(), self.options.adjustment.loss);
         linearized.transformation = datum.map(|datum| datum.transformation(self.size()));
         let inverted = {
-            let equations = linearized.equations(problem, threads);
-            let mut between = between(watch, Phase::Invert, problem.layout().locals());
+            let equations = linearized.equations(problem, context.threads);
             let options = InvertOptions { outer, ..InvertOptions::default() };
-            let inverted = linearized.invert(&equations, &options, threads, &mut between);
+            let inverted = linearized.invert(&equations, &options, context);
             inverted.map_err(|error| self.named(error))?
         };
         problem.system.release();
@@ -308,10 +302,10 @@ impl Node {
         let before = datum.map(|datum| state.iter().zip(datum.last).map(|(x, dx)| x - dx).collect());
         let before: &Vec<f64> = before.as_ref().unwrap_or(&inverted.values);
         let mut adjustment =
-            Adjustment::between(problem, loss, &inverted.held, before, state.to_vec(), threads);
+            Adjustment::between(problem, loss, &inverted.held, before, state.to_vec(), context.threads);
         adjustment.put(problem, inverted);
         let lost = adjustment.lost.unwrap_or(0.0);
-        let mut solution = self.solution_of(adjustment, threads);
+        let mut solution = self.solution_of(adjustment, context.threads);
         solution.datum.relative_error = lost;
         Ok((solution, below))
     }
@@ -359,8 +353,7 @@ impl Node {
         formed: &mut FormedNode,
         state: &[f64],
         left: &[&[f64]],
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Option<(Vec<f64>, f64)>, NetworkError> {
         self.check(&[state])?;
         let fit = left.iter().zip(self.below()).all(|(left, places)| left.len() == places.len());
@@ -376,11 +369,10 @@ impl Node {
             return Ok(None);
         }
         let problem = self.problem();
-        let equations = ObservationEquations::new(problem, None, state, &self.held, threads);
+        let equations = ObservationEquations::new(problem, None, state, &self.held, context.threads);
         self.zero_fixed(formed, &mut rights);
         rights.iter_mut().zip(&equations.prior().right).for_each(|(right, own)| *right += own);
-        let mut between = between(watch, Phase::Solve, problem.layout().locals());
-        let reduced = formed.linearized.factor.reduce_chord(threads, &equations, &rights, &mut between);
+        let reduced = formed.linearized.factor.reduce_chord(&equations, &rights, context);
         let reduced = reduced.map_err(|error| self.named(error.into()))?;
         let found = (reduced.left(), reduced.products[0]);
         formed.reduced = Some(Reduced::Chord(reduced));
@@ -396,8 +388,7 @@ impl Node {
         &self,
         formed: &mut FormedNode,
         mut rights: Vec<f64>,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<(Vec<f64>, Vec<f64>), NetworkError> {
         if !rights.len().is_multiple_of(self.size().max(1)) {
             return Err(NetworkError::State);
@@ -405,9 +396,8 @@ impl Node {
         self.zero_fixed(formed, &mut rights);
         let FormedNode { linearized, .. } = formed;
         let problem = self.problem();
-        let equations = linearized.equations(problem, threads);
-        let mut between = between(watch, Phase::Solve, problem.layout().locals());
-        let reduced = linearized.factor.reduce_rights(threads, &equations, &rights, &mut between);
+        let equations = linearized.equations(problem, context.threads);
+        let reduced = linearized.factor.reduce_rights(&equations, &rights, context);
         let reduced = reduced.map_err(|error| self.named(error.into()))?;
         let found = (reduced.left(), reduced.products.clone());
         formed.reduced = Some(Reduced::Datum(reduced));
@@ -431,19 +421,17 @@ impl Node {
         &self,
         formed: &mut FormedNode,
         outer: &[f64],
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
         let (linearized, problem) = (&formed.linearized, self.problem());
-        let equations = linearized.equations(problem, threads);
-        let mut between = between(watch, Phase::Solve, problem.layout().locals());
+        let equations = linearized.equations(problem, context.threads);
         let factor = &linearized.factor;
         let found = match formed.reduced.take() {
             Some(Reduced::Chord(reduced)) if reduced.left().len() == outer.len() => {
-                factor.solve_reduced_rights(threads, &equations, reduced, outer, &mut between)
+                factor.solve_reduced_rights(&equations, reduced, outer, context)
             }
             Some(Reduced::Datum(reduced)) if reduced.left().len() == outer.len() => {
-                factor.solve_reduced_rights(threads, &equations, reduced, outer, &mut between)
+                factor.solve_reduced_rights(&equations, reduced, outer, context)
             }
             _ => return Err(NetworkError::State),
         };

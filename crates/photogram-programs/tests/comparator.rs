@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use std::ops::ControlFlow;
-
 use num_complex::Complex64 as C;
-use photocore::Threads;
 use photocore::adjustment::{Method, Options, Status, Stop};
+use photocore::{Context, Threads};
 use photogram_programs::comparator::{
     Basis, Calibration, CalibrationError, Case, Comparator, GridPoint, Measurement, Placement, Solution,
 };
@@ -119,7 +117,7 @@ fn calibration(left_handed: bool) -> Calibration {
 
 fn adjust(calibration: &Calibration) -> Result<Solution, CalibrationError> {
     let threads = Threads::new(1).unwrap();
-    calibration.adjust_on(&OPTIONS, &threads, &mut |_| ControlFlow::Continue(()))
+    calibration.adjust_on(&OPTIONS, &mut Context::new(&threads))
 }
 
 #[test]

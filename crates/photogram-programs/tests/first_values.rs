@@ -2,10 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::ops::ControlFlow;
-
-use photocore::Threads;
 use photocore::geometry::{Matrix3, Pose, Vector3};
+use photocore::{Context, Threads};
 use photogram_programs::first_values::{
     FirstValues, Found, Frame, KnownPhoto, KnownPoint, Missing, Sighting, Source,
 };
@@ -59,7 +57,7 @@ fn given(seed: u32, photos: usize, control: usize, wrong: f64) -> (FirstValues, 
 
 fn found(given: &FirstValues) -> Found {
     let threads = Threads::new(1).unwrap();
-    given.find(&threads, &mut |_| ControlFlow::Continue(())).unwrap()
+    given.find(&mut Context::new(&threads)).unwrap()
 }
 
 fn farthest(found: &Found, truth: &[Pose]) -> f64 {

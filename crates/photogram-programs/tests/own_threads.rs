@@ -2,12 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-use std::ops::ControlFlow;
-
-use photocore::Threads;
-use photocore::adjustment::Event;
 use photocore::geometry::{self, ObjectSpace, Perspective, PoseNumbers, RotationSense, Vector3};
 use photocore::network::{Camera, Image, Network, Of, Options, Photo, Point};
+use photocore::{Context, Threads};
 use photogram_programs::comparator::{
     Basis, Calibration as Comparison, Case, Comparator, GridPoint, Measurement, Placement,
 };
@@ -21,10 +18,6 @@ const SENSE: RotationSense = RotationSense::GroundToPhoto;
 /// Number larger than all thresholds for parallel execution.
 const MANY: usize = 10_500;
 const FREE: f64 = f64::INFINITY;
-
-fn go(_: Event) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
 
 /// Returns deterministic numbers in [-1, 1).
 fn noise(index: usize) -> f64 {
@@ -77,12 +70,13 @@ fn block(strips: usize, points: usize) -> Network {
 
 fn adjust_block(network: &Network, threads: &Threads) {
     let options = Options::default();
-    let solution = network.adjustment(&options).kept(&[0, 1]).on(threads).watched(&mut go).run().unwrap();
-    let covariances = network.covariances(&options, &solution.state, None, threads, &mut go).unwrap();
-    covariances.cofactors(&[Of::Point(0), Of::Photo(0)], None, threads, &mut go).unwrap();
-    network.adjustment(&options).from_state(&solution.state).on(threads).watched(&mut go).run().unwrap();
+    let solution = network.adjustment(&options).kept(&[0, 1]).run_in(&mut Context::new(threads)).unwrap();
+    let covariances =
+        network.covariances(&options, &solution.state, None, &mut Context::new(threads)).unwrap();
+    covariances.cofactors(&[Of::Point(0), Of::Photo(0)], None, &mut Context::new(threads)).unwrap();
+    network.adjustment(&options).from_state(&solution.state).run_in(&mut Context::new(threads)).unwrap();
     let mut trial = solution.converged.expect("it converges").trial(network);
-    trial.stand(threads, &mut go).unwrap();
+    trial.stand(&mut Context::new(threads)).unwrap();
     trial.tests(true, threads).unwrap();
     trial.effects(&[0, 5], threads).unwrap();
     trial.responses(&[0, 5], threads).unwrap();
@@ -106,7 +100,7 @@ fn resect(threads: &Threads) {
         start: None,
         partials: Partials::AtComputed,
     };
-    resection.adjust_on(&Default::default(), threads, &mut go).unwrap();
+    resection.adjust_on(&Default::default(), &mut Context::new(threads)).unwrap();
 }
 
 fn orient(threads: &Threads) {
@@ -124,7 +118,7 @@ fn orient(threads: &Threads) {
         trace: false,
         scale: None,
     };
-    similarity::orient_on(&stations, &options, threads, &mut go).unwrap();
+    similarity::orient_on(&stations, &options, &mut Context::new(threads)).unwrap();
 }
 
 fn calibrate_comparator(threads: &Threads) {
@@ -147,7 +141,7 @@ fn calibrate_comparator(threads: &Threads) {
         measurements: (0..4 * MANY).map(measurement).collect(),
         comparator: comparator.clone(),
     };
-    calibration.adjust_on(&Default::default(), threads, &mut go).unwrap();
+    calibration.adjust_on(&Default::default(), &mut Context::new(threads)).unwrap();
 }
 
 fn calibrate_on_stars(threads: &Threads) {
@@ -184,7 +178,7 @@ fn calibrate_on_stars(threads: &Threads) {
     }
     calibration.pointings[0][0] += 1e-4;
     let options = stellar::Options { adjustment: Default::default(), unit: 1.0, whole: true };
-    calibration.adjust_on(&options, threads, &mut go).unwrap();
+    calibration.adjust_on(&options, &mut Context::new(threads)).unwrap();
     calibration.without_effect(threads).unwrap();
     calibration.correction(&Tolerances { refraction: 1e-9, distortion: 1e-9, passes: 20 }, threads).unwrap();
 }

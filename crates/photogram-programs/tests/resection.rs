@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use std::ops::ControlFlow;
-
-use photocore::Threads;
 use photocore::adjustment::{Method, Options, Published, Status, Stop};
 use photocore::geometry::{ObjectSpace, Point, RotationSense, Vector3, View, rotation};
+use photocore::{Context, Threads};
 use photogram_programs::resection::{
     ControlPoint, Degeneracy, Known, Partials, Pose, Resection, ResectionError, Solution,
     linearize_at_measured, three_points,
@@ -66,7 +64,7 @@ fn apart(a: &Pose, b: &Pose) -> f64 {
 
 fn adjust(resection: &Resection, options: &Options) -> Result<Solution, ResectionError> {
     let threads = Threads::new(1).unwrap();
-    resection.adjust_on(options, &threads, &mut |_| ControlFlow::Continue(()))
+    resection.adjust_on(options, &mut Context::new(&threads))
 }
 
 const POSE: Pose = Pose { position: [420.0, 310.0, 900.0], attitude: [0.05, -0.08, 2.1] };

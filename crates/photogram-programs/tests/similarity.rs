@@ -4,9 +4,9 @@
 
 use std::ops::ControlFlow;
 
-use photocore::Threads;
 use photocore::adjustment::Status;
 use photocore::geometry::{Vector3, rotation};
+use photocore::{Context, Threads};
 use photogram_programs::similarity::{
     Cause, Method, Options, Parameters, SimilarityError, Solution, Start, Started, Station, gauss_crout,
     orient_on,
@@ -25,7 +25,7 @@ const PLAIN: Options = Options {
 
 fn run(stations: &[Station], options: &Options) -> Result<Solution, SimilarityError> {
     let threads = Threads::new(1).unwrap();
-    orient_on(stations, options, &threads, &mut |_| ControlFlow::Continue(()))
+    orient_on(stations, options, &mut Context::new(&threads))
 }
 
 /// Positions in the unit square with some relief; the first two are far from each other.
@@ -143,8 +143,8 @@ fn the_start_of_the_report_needs_two_horizontal_stations() {
 #[test]
 fn an_interruption_stops_it() {
     let given = stations(&truth([0.0, 0.0, 0.3], 1.0), mixed);
-    let threads = Threads::new(1).unwrap();
-    let stopped = orient_on(&given, &PLAIN, &threads, &mut |_| ControlFlow::Break(()));
+    let (threads, mut stop) = (Threads::new(1).unwrap(), |_| ControlFlow::Break(()));
+    let stopped = orient_on(&given, &PLAIN, &mut Context::with_progress(&threads, &mut stop));
     assert_eq!(stopped.unwrap_err(), SimilarityError::Stopped(photocore::Stopped::Interrupted));
 }
 

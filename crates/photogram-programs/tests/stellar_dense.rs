@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
-use std::ops::ControlFlow;
-
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, Side};
-use photocore::Threads;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Status, Stop};
+use photocore::{Context, Threads};
 use photogram_programs::sky::{ARCSEC, Air, REFRACTION, Station};
 use photogram_programs::stellar::{
     Axis, COMMON, Calibration, Decentering, Form, Image, Kind, Options, Rows, Solution, Star, StellarError,
@@ -95,9 +93,7 @@ fn adjusted(calibration: &Calibration) -> Result<Solution, StellarError> {
     let adjustment =
         AdjustmentOptions { method, max_iterations: 50, covariance: true, loss: None, threads: 0 };
     let threads = Threads::new(2).unwrap();
-    calibration.adjust_on(&Options { adjustment, unit: 1.0, whole: true }, &threads, &mut |_| {
-        ControlFlow::Continue(())
-    })
+    calibration.adjust_on(&Options { adjustment, unit: 1.0, whole: true }, &mut Context::new(&threads))
 }
 
 /// Rows of R A and R l, with R from the left Cholesky factor of the weights.

@@ -2,7 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use photocore::adjustment::{Adjustment, History, Iteration, Loss, Seconds, Status};
+use photocore::Iteration;
+use photocore::adjustment::{Adjustment, History, Loss, Seconds, Status};
 use photocore::normals::Ordering;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;

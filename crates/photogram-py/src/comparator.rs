@@ -71,7 +71,7 @@ pub fn adjust_comparator(
     let options =
         Options { method: Method::Damped(Stop::Fraction(limit)), max_iterations, ..Options::default() };
     let workers = Workers::of(0, calibration.measurements.len());
-    let solution = watched(py, workers, None, |pool, watch| calibration.adjust_on(&options, pool, watch))?;
+    let solution = watched(py, workers, None, |context| calibration.adjust_on(&options, context))?;
     told(py, solution.map_err(|error| failure(&error))?)
 }
 

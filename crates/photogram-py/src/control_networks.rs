@@ -1,10 +1,7 @@
 //! Control networks of ISIS as columns; the documentation is in `_photocore.pyi`.
 
-use std::ops::ControlFlow;
-
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use photocore::Stopped;
-use photocore::adjustment::{Event, Phase, Watch};
 use photogram_files::control_network::fields::{Field, Kind, MEASURES, POINT};
 use photogram_files::control_network::{
     Column, Fault, Framing, Header, Names, Place, Points, Reason, Rest, Sparse, Table, Texts, decoded,
@@ -57,9 +54,7 @@ pub fn control_points<'py>(
     file: &Bound<'py, PyAny>,
 ) -> PyResult<PointsRow<'py>> {
     let framing = lengths.as_deref().map_or(Framing::Lengths, Framing::Listed);
-    let read = watched(py, Workers::CALLER, None, |_, watch| {
-        decoded(data, start..stop, framing, &mut || looked_after(watch))
-    })?;
+    let read = watched(py, Workers::CALLER, None, |context| decoded(data, start..stop, framing, context))?;
     row(py, read.map_err(|fault| raised(&fault, file))?)
 }
 
@@ -69,7 +64,7 @@ pub fn control_points_of_text<'py>(
     data: &[u8],
     file: &Bound<'py, PyAny>,
 ) -> PyResult<(PointsRow<'py>, String)> {
-    let read = watched(py, Workers::CALLER, None, |_, watch| read_text(data, &mut || looked_after(watch)))?;
+    let read = watched(py, Workers::CALLER, None, |context| read_text(data, context))?;
     let (points, around) = read.map_err(|fault| raised(&fault, file))?;
     Ok((row(py, points)?, around))
 }
@@ -83,7 +78,7 @@ pub fn control_point_messages<'py>(
 ) -> PyResult<Bound<'py, PyBytes>> {
     let (points, measures) = (Held::table(points, POINT)?, Held::table(measures, MEASURES)?);
     let all = all(&points, &measures, firsts.as_slice()?)?;
-    let written = watched(py, Workers::CALLER, None, |_, watch| encoded(&all, &mut || looked_after(watch)))?;
+    let written = watched(py, Workers::CALLER, None, |context| encoded(&all, context))?;
     Ok(PyBytes::new(py, &written.map_err(|fault| raised(&fault, py.None().bind(py)))?))
 }
 
@@ -96,13 +91,8 @@ pub fn control_point_text<'py>(
 ) -> PyResult<Bound<'py, PyBytes>> {
     let (points, measures) = (Held::table(points, POINT)?, Held::table(measures, MEASURES)?);
     let all = all(&points, &measures, firsts.as_slice()?)?;
-    let written = watched(py, Workers::CALLER, None, |_, watch| text(&all, &mut || looked_after(watch)))?;
+    let written = watched(py, Workers::CALLER, None, |context| text(&all, context))?;
     Ok(PyBytes::new(py, written.map_err(|fault| raised(&fault, py.None().bind(py)))?.as_bytes()))
-}
-
-/// Checks signals; an exception is reported to the caller.
-fn looked_after(watch: Watch<'_>) -> ControlFlow<()> {
-    watch(Event::Progress { phase: Phase::Form, done: 0, total: 0 })
 }
 
 /// Converts a fault to an exception with its file and the number of its point or line.

@@ -74,8 +74,7 @@ pub fn resect(
 
 /// Adjusts on the calling thread: the work for one photo is too small for another thread.
 fn run(py: Python<'_>, resection: &Resection, options: &Options) -> PyResult<ResectionSolution> {
-    let solution =
-        watched(py, Workers::CALLER, None, |pool, watch| resection.adjust_on(options, pool, watch))?;
+    let solution = watched(py, Workers::CALLER, None, |context| resection.adjust_on(options, context))?;
     told(py, &solution.map_err(|error| ResectionError::new_err((kind(error), error.to_string())))?)
 }
 

@@ -105,7 +105,7 @@ fn run(
     threads: usize,
 ) -> PyResult<SimilaritySolution> {
     let workers = Workers::of(threads, stations.len());
-    let solution = watched(py, workers, None, |pool, watch| orient_on(stations, options, pool, watch))?;
+    let solution = watched(py, workers, None, |context| orient_on(stations, options, context))?;
     told(py, solution.map_err(|error| failure(&error))?)
 }
 

@@ -2,8 +2,8 @@
 
 use nalgebra::Complex;
 use numpy::{PyArray1, PyArrayMethods};
-use photocore::Threads;
-use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop, Watch};
+use photocore::Context;
+use photocore::adjustment::{Method, Options as AdjustmentOptions, Stop};
 use photocore::geometry::Camera as Lens;
 use photogram_programs::sky::{Air, Station, pointing, pointing_angles};
 use photogram_programs::stellar::{
@@ -288,7 +288,7 @@ impl StellarProblem {
             unit,
             whole,
         };
-        let work = |pool: &Threads, watch: Watch<'_>| self.calibration.adjust_on(&options, pool, watch);
+        let work = |context: &mut Context<'_>| self.calibration.adjust_on(&options, context);
         let solution = watched(py, Workers::of(threads, self.calibration.images.len()), progress, work)?
             .map_err(|error| failure(&error))?;
         let found = observations(py, solution.observations)?;
@@ -314,8 +314,9 @@ impl StellarProblem {
     }
 
     fn without_effect(&self, py: Python<'_>) -> PyResult<Vec<usize>> {
-        let work = |pool: &Threads, _: &mut dyn FnMut(_) -> _| self.calibration.without_effect(pool);
-        watched(py, Workers::of(0, 0), None, work)?.map_err(|error| failure(&error))
+        let found =
+            watched(py, Workers::of(0, 0), None, |context| self.calibration.without_effect(context.threads))?;
+        found.map_err(|error| failure(&error))
     }
 
     #[pyo3(signature = (*, refraction, distortion, passes))]
@@ -327,8 +328,10 @@ impl StellarProblem {
         passes: usize,
     ) -> PyResult<Bound<'py, PyDict>> {
         let tolerances = Tolerances { refraction, distortion, passes };
-        let work = |pool: &Threads, _: &mut dyn FnMut(_) -> _| self.calibration.correction(&tolerances, pool);
-        let correction = watched(py, Workers::of(0, 0), None, work)?.map_err(|error| failure(&error))?;
+        let correction = watched(py, Workers::of(0, 0), None, |context| {
+            self.calibration.correction(&tolerances, context.threads)
+        })?;
+        let correction = correction.map_err(|error| failure(&error))?;
         let found = PyDict::new(py);
         found.set_item("parameters", PyArray1::from_vec(py, correction.parameters))?;
         found.set_item("without_effect", correction.without_effect)?;

@@ -45,8 +45,9 @@ impl TableReader {
 
     fn add(&mut self, py: Python<'_>, lines: &[u8]) -> PyResult<bool> {
         let mut table = self.table.take();
-        let Ok(table) = watched(py, Workers::reading(lines.len() / LINE), None, |pool, _| {
-            let regular = pool.install(|| table.as_mut().and_then(|table| table.add(lines))).is_some();
+        let Ok(table) = watched(py, Workers::reading(lines.len() / LINE), None, |context| {
+            let regular =
+                context.threads.install(|| table.as_mut().and_then(|table| table.add(lines))).is_some();
             Ok::<_, Infallible>(table.filter(|_| regular))
         })?;
         self.table = table;
@@ -147,8 +148,8 @@ pub fn csv_rows<'py>(py: Python<'py>, columns: Vec<Column>) -> PyResult<Bound<'p
         own
     };
     let firsts: Vec<usize> = (0..rows).step_by(STRETCH).collect();
-    let Ok(parts) = watched(py, Workers::reading(rows), None, |pool, _| {
-        let parts = pool.install(|| firsts.par_iter().map(|&first| stretch(first)).collect());
+    let Ok(parts) = watched(py, Workers::reading(rows), None, |context| {
+        let parts = context.threads.install(|| firsts.par_iter().map(|&first| stretch(first)).collect());
         Ok::<Vec<Vec<u8>>, Infallible>(parts)
     })?;
     PyBytes::new_with(py, parts.iter().map(Vec::len).sum(), |to| {

@@ -6,8 +6,7 @@ use std::sync::OnceLock;
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use photocore::Threads;
-use photocore::adjustment::{Event, Phase, Watch};
+use photocore::{Context, Event, Phase, Threads};
 use pyo3::prelude::*;
 use rayon::{ThreadBuilder, ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
@@ -67,11 +66,11 @@ pub fn watched<T: Send, E: Send>(
     py: Python<'_>,
     workers: Workers,
     progress: Option<Py<PyAny>>,
-    work: impl FnOnce(&Threads, Watch<'_>) -> Result<T, E> + Send,
+    work: impl FnOnce(&mut Context<'_>) -> Result<T, E> + Send,
 ) -> PyResult<Result<T, E>> {
     let (mut work, mut found) = (Some(work), None);
-    let mut once = |pool: &Threads, watch: Watch<'_>| {
-        found = work.take().map(|work| work(pool, watch));
+    let mut once = |context: &mut Context<'_>| {
+        found = work.take().map(|work| work(context));
         matches!(found, Some(Ok(_)))
     };
     supervise(py, workers, progress, &mut once)?;
@@ -83,12 +82,12 @@ fn supervise(
     py: Python<'_>,
     workers: Workers,
     progress: Option<Py<PyAny>>,
-    work: &mut (dyn FnMut(&Threads, Watch<'_>) -> bool + Send),
+    work: &mut (dyn FnMut(&mut Context<'_>) -> bool + Send),
 ) -> PyResult<()> {
     let failures = memory::arm()?;
     let mut raised = None;
     let (mut last, mut inverts) = (Instant::now(), false);
-    let mut watch = |event: Event| {
+    let mut report = |event: Event| {
         if failures.more() {
             return ControlFlow::Break(());
         }
@@ -112,14 +111,17 @@ fn supervise(
     // A thread remains in its pool for the life of the process: only the main thread becomes a pool. Other threads are temporary.
     let done = if workers.threads.is_none() && is_main_thread(py)? {
         let pool = pool_of_main_thread()?;
-        py.detach(|| (!workers.multiply || memory::take_buffers()).then(|| work(pool, &mut watch)))
+        py.detach(|| {
+            (!workers.multiply || memory::take_buffers())
+                .then(|| work(&mut Context::with_progress(pool, &mut report)))
+        })
     } else {
         let (pool, handles) = start(workers.count())?;
         py.detach(|| {
             let room =
                 !workers.multiply || pool.broadcast(|_| memory::take_buffers()).into_iter().all(|has| has);
             let pool = Threads::from(pool);
-            let done = room.then(|| work(&pool, &mut watch));
+            let done = room.then(|| work(&mut Context::with_progress(&pool, &mut report)));
             drop(pool);
             // Threads retain their buffers until they end, and later threads may need the memory. A panic has reached the caller.
             handles.into_iter().for_each(|thread| drop(thread.join()));

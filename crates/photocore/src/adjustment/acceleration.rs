@@ -24,12 +24,13 @@ use nalgebra::DMatrix;
 
 use super::control::{BENDS, Control, ROUNDING};
 use super::equations::ObservationEquations;
-use super::options::{History, Iteration, NEGLIGIBLE, Phase, Stop};
+use super::options::{History, NEGLIGIBLE, Stop};
 use super::problem::Evaluated;
 use super::result::AdjustError;
-use super::run::{Iterate, Run, between};
+use super::run::{Iterate, Run};
 use super::secants::Secants;
 use super::statistics::weighted;
+use crate::Iteration;
 use crate::normals::{Chord, SolveOptions, dot};
 
 /// Minimum ratio of two successive step lengths for acceleration, which continues for all later steps.
@@ -173,10 +174,11 @@ impl<'a> Run<'a, '_> {
     /// Returns the second-order term a of a step, and a^T (N + damping) a. The few ties are regarded as linear.
     fn second_order(&mut self, state: &Iterate<'a>, step: &[f64]) -> Result<(Vec<f64>, f64), AdjustError> {
         let part: Vec<f64> = step.iter().map(|value| PART * value).collect();
-        let ahead = self.problem.residuals(self.threads, &self.problem.advanced(state.values(), &part));
+        let ahead =
+            self.problem.residuals(self.context.threads, &self.problem.advanced(state.values(), &part));
         let (equations, layout) = (&state.equations, self.problem.layout());
         let of_groups = layout.groups() * layout.rows();
-        let right = equations.transposed(self.threads, 1, |row, bend| {
+        let right = equations.transposed(self.context.threads, 1, |row, bend| {
             let difference = || weighted(ahead[row.number], equations.deviation(row.number)) - row.constant;
             bend[0] = match row.number < of_groups {
                 true => 2.0 / PART * (difference() / PART + row.change(step)),
@@ -242,7 +244,7 @@ impl<'a> Run<'a, '_> {
         iteration: &Iteration,
     ) -> Option<(Vec<f64>, Iteration)> {
         let all = self.secants.all(step);
-        let products = state.equations.products(self.threads, &all);
+        let products = state.equations.products(self.context.threads, &all);
         let shares = self.secants.shares(&products)?;
         let own = self.secants.corrected(step, &shares);
         let largest_change = (&products * &shares).dot(&shares).max(0.0).sqrt();
@@ -368,10 +370,9 @@ impl<'a> Run<'a, '_> {
         state: &Iterate<'a>,
         values: &[f64],
     ) -> Result<(ObservationEquations<'a>, Chord), AdjustError> {
-        let (problem, threads) = (self.problem, self.threads);
-        let equations = ObservationEquations::new(problem, None, values, &self.datum, threads);
-        let mut between = between(&mut *self.watch, Phase::Solve, problem.layout().locals());
-        let chord = state.linearized.factor.chord(threads, &equations, &mut between);
+        let equations =
+            ObservationEquations::new(self.problem, None, values, &self.datum, self.context.threads);
+        let chord = state.linearized.factor.chord(&equations, &mut self.context);
         Ok((equations, chord?))
     }
 }

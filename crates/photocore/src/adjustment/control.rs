@@ -1,6 +1,7 @@
 //! Rules and state of the step control.
 
-use super::options::{Iteration, NEGLIGIBLE, Stop};
+use super::options::{NEGLIGIBLE, Stop};
+use crate::Iteration;
 
 /// Maximum change, in standard deviations, for the second-order term of a loss, which is harmful farther from the solution.
 pub(super) const NEAR: f64 = 1.0;

@@ -3,9 +3,10 @@
 use std::ops::ControlFlow;
 
 use super::control::{Control, MOST_DAMPING, SHORT};
-use super::options::{Iteration, Status};
+use super::options::Status;
 use super::result::AdjustError;
 use super::run::{End, Iterate, Next, Run};
+use crate::Iteration;
 
 /// Maximum change, in standard deviations, of a full step that confirms the convergence of damped steps.
 const CONFIRMED: f64 = 1e-2;
@@ -81,7 +82,7 @@ impl<'a> Run<'a, '_> {
             return self.stay(state, status);
         }
         if self.datum.is_empty() {
-            self.datum = self.problem.to_hold(&unknowns, self.threads);
+            self.datum = self.problem.to_hold(&unknowns, self.context.threads);
         }
         let last = self.iterations.last();
         let in_valley = moving && last.is_some_and(|last| last.largest_change <= SHORT);

@@ -9,8 +9,8 @@ use super::loss::{Loss, Reweighting};
 use super::options::{Options, Status};
 use super::problem::AnyProblem;
 use super::result::{AdjustError, Adjustment, Effort, Seconds};
-use crate::Threads;
-use crate::normals::{Between, FactorOptions, InvertOptions};
+use crate::normals::{FactorOptions, InvertOptions};
+use crate::{Context, Threads};
 
 impl Adjustment {
     /// Creates the result at final values, without iterations and cofactors.
@@ -118,19 +118,18 @@ impl Linearized {
         adjusted: Adjusted<'_>,
         datum: &Datum,
         reference: &[f64],
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Self, DatumError> {
         problem.check_lengths(adjusted.unknowns).map_err(AdjustError::from)?;
-        let (unknowns, basis) = moved(problem, adjusted, datum, reference, threads)?;
+        let (unknowns, basis) = moved(problem, adjusted, datum, reference, context.threads)?;
         let Adjusted { held, loss, .. } = adjusted;
         let reweighting = loss.map(Reweighting::plain);
-        let equations = ObservationEquations::new(problem, reweighting, &unknowns, held, threads);
+        let equations = ObservationEquations::new(problem, reweighting, &unknowns, held, context.threads);
         let options = FactorOptions::default();
-        let formed = Self::of(&equations, unknowns, held.to_vec(), &options, threads, between)?;
+        let formed = Self::of(&equations, unknowns, held.to_vec(), &options, context)?;
         let mut linearized = formed.determined()?;
         linearized.basis = Some(basis);
-        linearized.take_to_datum(&equations, threads, between)?;
+        linearized.take_to_datum(&equations, context)?;
         linearized.factor.forget();
         Ok(linearized)
     }
@@ -142,11 +141,10 @@ impl Linearized {
     pub fn inverted(
         self,
         problem: &AnyProblem<'_>,
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Inverted, DatumError> {
-        let equations = self.equations(problem, threads);
-        Ok(self.invert(&equations, &InvertOptions::default(), threads, between)?)
+        let equations = self.equations(problem, context.threads);
+        Ok(self.invert(&equations, &InvertOptions::default(), context)?)
     }
 }
 
@@ -165,19 +163,18 @@ impl Adjustment {
         options: &Options,
         datum: &Datum,
         reference: &[f64],
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<f64, DatumError> {
         if self.undetermined.is_some() {
             return Err(DatumError::NoCofactors);
         }
         let adjusted = Adjusted { unknowns: &self.unknowns, held: &self.datum, loss: options.loss };
         if !options.covariance {
-            (self.unknowns, _) = moved(problem, adjusted, datum, reference, threads)?;
+            (self.unknowns, _) = moved(problem, adjusted, datum, reference, context.threads)?;
             return Ok(0.0);
         }
-        let linearized = Linearized::in_datum(problem, adjusted, datum, reference, threads, between)?;
-        let mut inverted = linearized.inverted(problem, threads, between)?;
+        let linearized = Linearized::in_datum(problem, adjusted, datum, reference, context)?;
+        let mut inverted = linearized.inverted(problem, context)?;
         self.unknowns = std::mem::take(&mut inverted.values);
         self.put(problem, inverted);
         self.redundancy_excess = options.loss.is_none().then(|| self.excess());

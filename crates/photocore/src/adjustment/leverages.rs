@@ -5,21 +5,19 @@
 
 use std::borrow::Cow;
 use std::collections::BTreeSet;
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 
 use super::equations::ObservationEquations;
 use super::group_test::{leverage_odds, may_correlate};
 use super::linearized::{CofactorError, Inverted, Linearized};
-use super::options::Phase;
 use super::problem::AnyProblem;
 use super::result::{AdjustError, Adjustment};
-use super::run::{Watch, between};
 use super::walk::Buffers;
 use crate::normals::{
     Cofactors, Equations, FactorOptions, Function, InvertOptions, Layout, LayoutError, RowCofactors,
     SelectedInverse,
 };
-use crate::{Threads, parallel};
+use crate::{Context, Threads, parallel};
 use faer::Mat;
 
 /// Problem at adjusted values, with all cofactors inside the pattern of its normal equations.
@@ -57,20 +55,17 @@ impl Leverages {
         problem: &AnyProblem<'_>,
         values: Vec<f64>,
         held: Vec<usize>,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Self, AdjustError> {
         problem.check_lengths(&values)?;
-        let mut between = between(watch, Phase::Form, problem.layout().locals());
-        let equations = ObservationEquations::new(problem, None, &values, &held, threads);
+        let equations = ObservationEquations::new(problem, None, &values, &held, context.threads);
         let forming = FactorOptions::UNCACHED;
-        let formed =
-            Linearized::of(&equations, values, held, &forming, threads, &mut between)?.determined()?;
-        let factor = formed.small_factor(threads);
+        let formed = Linearized::of(&equations, values, held, &forming, context)?.determined()?;
+        let factor = formed.small_factor(context.threads);
         let inverting = InvertOptions { by_groups: true, ..InvertOptions::default() };
-        let found = formed.invert(&equations, &inverting, threads, &mut between)?;
+        let found = formed.invert(&equations, &inverting, context)?;
         let Inverted { values, held, cofactors, selected, .. } = found;
-        let residuals = problem.residuals(threads, &values);
+        let residuals = problem.residuals(context.threads, &values);
         let linearized = factor.map(|factor| Linearized::of_factor(factor, values.clone(), held.clone()));
         Ok(Self { values, held, residuals, cofactors, selected, linearized })
     }
@@ -87,8 +82,8 @@ impl Leverages {
         if let Some(own) = &self.linearized {
             return Ok(Cow::Borrowed(own));
         }
-        let (values, held, mut on) = (self.values.clone(), self.held.clone(), |_| ControlFlow::Continue(()));
-        Ok(Cow::Owned(Linearized::form(problem, None, values, held, threads, &mut on)?))
+        let (values, held) = (self.values.clone(), self.held.clone());
+        Ok(Cow::Owned(Linearized::form(problem, None, values, held, &mut Context::new(threads))?))
     }
 
     /// Weighted sum of squares of the included observations.
@@ -172,12 +167,12 @@ impl Leverages {
             return Ok(());
         }
         let asked = self.equations(problem, threads).with_deviations(observation_sd);
-        let (formed, mut on) = (self.linearized(problem, threads)?, |_| ControlFlow::Continue(()));
+        let (formed, mut context) = (self.linearized(problem, threads)?, Context::new(threads));
         for (place, local, chosen) in chosen {
             let own = &mut found[place];
             let (rows_of_groups, _) = rows_of_local(&asked, local);
             let functions: Vec<Function> = chosen.iter().map(|&row| rows_of_groups[row].clone()).collect();
-            let cofactors = match formed.cofactors(problem, &functions, None, None, threads, &mut on) {
+            let cofactors = match formed.cofactors(problem, &functions, None, None, &mut context) {
                 Err(CofactorError::Adjust(error)) => return Err(error),
                 found => found.unwrap_or_default(),
             };

@@ -11,11 +11,10 @@ use super::loss::{Loss, Reweighting};
 use super::problem::AnyProblem;
 use super::result::{AdjustError, Seconds, gib};
 use super::transformation::Transformation;
-use crate::Threads;
 use crate::normals::{
-    Between, Cofactors, Factor, FactorOptions, Function, Inversion, InvertOptions, SelectedInverse,
-    SolveOptions,
+    Cofactors, Factor, FactorOptions, Function, Inversion, InvertOptions, SelectedInverse, SolveOptions,
 };
+use crate::{Context, Threads};
 
 /// Factored normal equations of a problem at given values, in the datum of the constrained unknowns or any other.
 #[derive(Debug, Clone)]
@@ -85,13 +84,12 @@ impl Linearized {
         loss: Option<Loss>,
         values: Vec<f64>,
         held: Vec<usize>,
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Self, AdjustError> {
         problem.check_lengths(&values)?;
         let reweighting = loss.map(Reweighting::plain);
-        let equations = ObservationEquations::new(problem, reweighting, &values, &held, threads);
-        Self::of(&equations, values, held, &FactorOptions::UNCACHED, threads, between)
+        let equations = ObservationEquations::new(problem, reweighting, &values, &held, context.threads);
+        Self::of(&equations, values, held, &FactorOptions::UNCACHED, context)
     }
 
     /// Forms and factors given observation equations.
@@ -101,11 +99,10 @@ impl Linearized {
         values: Vec<f64>,
         held: Vec<usize>,
         options: &FactorOptions,
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Self, AdjustError> {
         let (start, problem) = (Instant::now(), equations.problem());
-        let factor = problem.system.factor(threads, equations, options, between)?;
+        let factor = problem.system.factor(equations, options, context)?;
         let sum_of_squares = factor.sum_of_squares + equations.terms().sum_of_squares(0..values.len());
         let (took, share) = (start.elapsed().as_secs_f64(), factor.formation_share);
         let seconds = Seconds { form: took * share, factor: took * (1.0 - share), ..Seconds::default() };
@@ -204,23 +201,22 @@ impl Linearized {
         rows: &[Function],
         columns: Option<&[Function]>,
         memory: Option<usize>,
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Vec<f64>, CofactorError> {
         let unmoved = |functions: &[Function]| -> Vec<Function> {
             functions.iter().map(|function| self.unmoved(problem, function)).collect()
         };
         let (free, others) = (unmoved(rows), columns.map(unmoved));
         let reduced = {
-            let equations = self.equations(problem, threads);
-            let reduced = self.factor.reduce(threads, &equations, &free, others.as_deref(), between);
+            let equations = self.equations(problem, context.threads);
+            let reduced = self.factor.reduce(&equations, &free, others.as_deref(), context);
             reduced.map_err(AdjustError::from)?
         };
         let needed = self.factor.memory_of(&reduced);
         if let Some(available) = memory.filter(|&available| needed > available) {
             return Err(CofactorError::Memory { needed, available });
         }
-        let matrix = self.factor.cofactors_of(threads, &reduced, between);
+        let matrix = self.factor.cofactors_of(&reduced, context);
         let mut matrix = matrix.map_err(AdjustError::from)?;
         if let Some(transformation) = &self.transformation {
             transformation.apply_to_functions(rows, columns, &mut matrix);
@@ -238,12 +234,11 @@ impl Linearized {
         problem: &AnyProblem<'_>,
         unknowns: &[usize],
         memory: Option<usize>,
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Option<Vec<f64>>, AdjustError> {
         let rows: Vec<Function> =
             unknowns.iter().map(|&unknown| std::iter::once((unknown, 1.0)).collect()).collect();
-        match self.cofactors(problem, &rows, None, memory, threads, between) {
+        match self.cofactors(problem, &rows, None, memory, context) {
             Ok(found) => Ok(Some(found)),
             Err(CofactorError::Memory { .. }) => Ok(None),
             Err(CofactorError::Adjust(error)) => Err(error),
@@ -265,11 +260,10 @@ impl Linearized {
         &self,
         problem: &AnyProblem<'_>,
         rights: &[f64],
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
         let options = SolveOptions { rights: Some(rights), ..SolveOptions::default() };
-        self.solve(&self.equations(problem, threads), &options, threads, between)
+        self.solve(&self.equations(problem, context.threads), &options, context)
     }
 
     /// Computes R z for columns z over the equations of [`AnyProblem::equations`], one after the other: the residuals caused by errors z, in
@@ -281,20 +275,19 @@ impl Linearized {
         &self,
         problem: &AnyProblem<'_>,
         mut columns: Vec<f64>,
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
-        let equations = self.equations(problem, threads);
+        let equations = self.equations(problem, context.threads);
         let (height, unknowns) = (problem.equations().max(1), problem.layout().unknowns().max(1));
         let count = columns.len() / height;
-        let rights = equations.transposed(threads, count, |row, z| {
+        let rights = equations.transposed(context.threads, count, |row, z| {
             z.iter_mut().zip(columns.chunks_exact(height)).for_each(|(z, column)| *z = column[row.number]);
         });
         let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
-        let solutions = self.solve(&equations, &options, threads, between)?;
+        let solutions = self.solve(&equations, &options, context)?;
         drop(rights);
         let solutions: Vec<&[f64]> = solutions.chunks_exact(unknowns).collect();
-        let changes = equations.times(threads, &solutions);
+        let changes = equations.times(context.threads, &solutions);
         for (row, changes) in changes.chunks_exact(count.max(1)).enumerate() {
             for (column, change) in columns.chunks_exact_mut(height).zip(changes) {
                 column[row] -= change;
@@ -316,10 +309,9 @@ impl Linearized {
         &self,
         equations: &ObservationEquations<'_>,
         options: &SolveOptions<'_>,
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
-        Ok(self.factor.solve(threads, equations, options, between)?)
+        Ok(self.factor.solve(equations, options, context)?)
     }
 
     /// Computes the selected inverse in the requested datum.
@@ -328,16 +320,16 @@ impl Linearized {
         self,
         equations: &ObservationEquations<'_>,
         options: &InvertOptions<'_>,
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Inverted, AdjustError> {
         let (start, problem) = (Instant::now(), equations.problem());
         let Self { values, held, factor, transformation, mut seconds, .. } = self;
-        let found = factor.invert(threads, equations, options, between);
+        let found = factor.invert(equations, options, context);
         let Inversion { mut cofactors, selected, inversion_share } = found?;
         let prior_redundancy = problem.finish_cofactors(&mut cofactors, &held, equations.terms());
-        let lost = transformation
-            .map(|transformation| threads.install(|| transformation.apply(problem.layout(), &mut cofactors)));
+        let lost = transformation.map(|transformation| {
+            context.threads.install(|| transformation.apply(problem.layout(), &mut cofactors))
+        });
         let took = start.elapsed().as_secs_f64();
         (seconds.invert, seconds.cofactors) = (took * inversion_share, took * (1.0 - inversion_share));
         Ok(Inverted { values, held, cofactors, prior_redundancy, selected, lost, seconds })
@@ -347,14 +339,13 @@ impl Linearized {
     pub(super) fn take_to_datum(
         &mut self,
         equations: &ObservationEquations<'_>,
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<(), AdjustError> {
         let Some(basis) = self.basis.take() else { return Ok(()) };
         let start = Instant::now();
         let rights = basis.rights(equations.problem(), &self.held);
         let options = SolveOptions { rights: Some(&rights), ..SolveOptions::default() };
-        let columns = self.solve(equations, &options, threads, between)?;
+        let columns = self.solve(equations, &options, context)?;
         self.transformation = Some(basis.transformation(&columns));
         self.seconds.solve += start.elapsed().as_secs_f64();
         Ok(())

@@ -112,13 +112,11 @@ pub use noncentral::{
     detectable_noncentrality, level_of_equal_power, noncentral_chi_square, noncentral_fisher,
 };
 pub use observation_rows::ObservationRows;
-pub use options::{Event, History, Iteration, Method, Options, Phase, Published, Status, Stop};
+pub use options::{History, Method, Options, Published, Status, Stop};
 pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem};
 pub(crate) use result::gib;
 pub use result::{AdjustError, Adjustment, Effort, Seconds};
-pub use run::{Requests, Watch, adjust, adjust_with};
-#[doc(hidden)]
-pub use run::{between, go_on};
+pub use run::{Requests, adjust, adjust_with};
 pub use score_parts::{Groups, ScoreParts};
 #[doc(hidden)]
 pub use statistics::median;

@@ -1,6 +1,7 @@
-//! Options, step history and progress events of an adjustment.
+//! Options and step history of an adjustment.
 
 use super::loss::Loss;
+use crate::Iteration;
 
 /// Options of an adjustment. Default: least squares without a loss, converged to 1e-5 standard deviations, with cofactors.
 #[derive(Debug, Clone, Copy)]
@@ -32,46 +33,6 @@ pub enum Status {
     NotConverged,
     /// The sum of squares increased, and shorter steps did not lower it.
     Diverged,
-}
-
-/// Record of one iteration.
-#[derive(Debug, Clone, Copy)]
-pub struct Iteration {
-    /// Number, starting at 1.
-    pub number: usize,
-    /// Weighted sum of squares after its step; with a loss, the sum of losses.
-    pub sum_of_squares: f64,
-    /// Upper bound of the changes of all unknowns, in standard deviations (a priori unit weight).
-    pub largest_change: f64,
-    /// Damping of its step as a fraction of the diagonal of the normal matrix; 0 for a Gauss-Newton step.
-    pub damping: f64,
-}
-
-/// Phase of an adjustment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Phase {
-    /// Formation and factorisation of the normal equations.
-    Form,
-    /// Solution.
-    Solve,
-    /// Inversion, with cofactors and redundancy numbers.
-    Invert,
-}
-
-/// Progress event of a running adjustment.
-#[derive(Debug, Clone, Copy)]
-pub enum Event {
-    /// Progress of a phase: `done` of `total` local blocks.
-    Progress {
-        /// The phase.
-        phase: Phase,
-        /// Number of finished local blocks.
-        done: usize,
-        /// Number of all local blocks.
-        total: usize,
-    },
-    /// A finished iteration.
-    Iteration(Iteration),
 }
 
 /// Step control, with the stopping rules that it supports.

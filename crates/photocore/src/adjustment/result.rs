@@ -2,10 +2,10 @@
 
 use thiserror::Error;
 
-use super::options::{Iteration, NEGLIGIBLE, Status};
+use super::options::{NEGLIGIBLE, Status};
 use super::statistics::{Counts, Observed, square, standardized};
-use crate::Stopped;
 use crate::normals::{Cofactors, Factor, LayoutError, Operations, Ordering, SelectedInverse, SystemError};
+use crate::{Iteration, Stopped};
 
 /// Computing time of each phase in seconds, over all iterations.
 #[derive(Debug, Clone, Copy, Default)]

@@ -8,44 +8,33 @@ use super::datum::{Adjusted, Basis, Datum, moved};
 use super::equations::ObservationEquations;
 use super::linearized::Linearized;
 use super::loss::Reweighting;
-use super::options::{Event, Iteration, Method, Options, Phase, Published, Status, leaves_cofactors};
+use super::options::{Method, Options, Published, Status, leaves_cofactors};
 use super::problem::{AnyProblem, Evaluated, Model, Problem};
 use super::result::{AdjustError, Adjustment, Seconds};
 use super::secants::Secants;
 use crate::normals::{FactorOptions, InvertOptions, SolveOptions};
-use crate::{Stopped, Threads};
-
-/// Progress callback, called on the calling thread with events; `Break` stops the work.
-pub type Watch<'a> = &'a mut dyn FnMut(Event) -> ControlFlow<()>;
-
-/// Progress callback that never stops the work.
-pub fn go_on(_: Event) -> ControlFlow<()> {
-    ControlFlow::Continue(())
-}
+use crate::{Context, Event, Iteration, Threads};
 
 impl<M: Model> Problem<M> {
-    /// Adjusts by least squares on its own threads; [`adjust`] uses the caller's threads and reports progress.
+    /// Adjusts by least squares on its own threads; [`adjust`] uses those of the caller and reports progress.
     ///
     /// # Errors
     /// Lengths that contradict the layout, undetermined unknowns, observations that cannot be computed, or threads that cannot be started.
     pub fn adjust(&self, options: &Options) -> Result<Adjustment, AdjustError> {
-        adjust(self.any(), options, &Threads::new(options.threads)?, &mut go_on)
+        adjust(self.any(), options, &mut Context::new(&Threads::new(options.threads)?))
     }
 }
 
 /// Adjusts a problem by least squares.
-///
-/// `watch` is called on the calling thread with progress events; `Break` stops the adjustment.
 ///
 /// # Errors
 /// Lengths that contradict the layout, undetermined unknowns, observations that cannot be computed, or an interruption.
 pub fn adjust(
     problem: &AnyProblem<'_>,
     options: &Options,
-    threads: &Threads,
-    watch: Watch<'_>,
+    context: &mut Context<'_>,
 ) -> Result<Adjustment, AdjustError> {
-    adjust_with(problem, options, Requests::default(), threads, watch)
+    adjust_with(problem, options, Requests::default(), context)
 }
 
 /// Further results of an adjustment.
@@ -72,8 +61,7 @@ pub fn adjust_with(
     problem: &AnyProblem<'_>,
     options: &Options,
     requests: Requests<'_>,
-    threads: &Threads,
-    watch: Watch<'_>,
+    context: &mut Context<'_>,
 ) -> Result<Adjustment, AdjustError> {
     problem.check_lengths(&problem.initial)?;
     let mut run = Run {
@@ -82,8 +70,7 @@ pub fn adjust_with(
         requests,
         is_near: false,
         has_moved: false,
-        threads,
-        watch,
+        context: context.reborrow(),
         seconds: Seconds::default(),
         formations: 0,
         iterations: vec![],
@@ -99,7 +86,7 @@ pub fn adjust_with(
     let damping = match options.method {
         Method::TrustRegion(_) => ALWAYS.first,
         Method::Full(_) | Method::Damped(_) => {
-            run.datum = problem.to_hold(&problem.initial, threads);
+            run.datum = problem.to_hold(&problem.initial, run.context.threads);
             0.0
         }
     };
@@ -186,8 +173,7 @@ pub(super) struct Run<'a, 'w> {
     is_near: bool,
     /// Whether the network was transformed during the iterations.
     has_moved: bool,
-    pub threads: &'a Threads,
-    pub(super) watch: &'w mut dyn FnMut(Event) -> ControlFlow<()>,
+    pub context: Context<'w>,
     pub(super) seconds: Seconds,
     formations: usize,
     pub iterations: Vec<Iteration>,
@@ -226,8 +212,7 @@ impl<'a> Run<'a, '_> {
         options: SolveOptions<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
         let start = Instant::now();
-        let mut between = between(&mut *self.watch, Phase::Solve, self.problem.layout().locals());
-        let found = state.linearized.solve(&state.equations, &options, self.threads, &mut between)?;
+        let found = state.linearized.solve(&state.equations, &options, &mut self.context)?;
         self.seconds.solve += start.elapsed().as_secs_f64();
         Ok(found)
     }
@@ -239,14 +224,18 @@ impl<'a> Run<'a, '_> {
 
     /// Evaluates the model, and its objective.
     pub(super) fn evaluated(&self, unknowns: &[f64]) -> (Box<dyn Evaluated + 'a>, f64) {
-        let at = self.threads.install(|| self.problem.model.at(unknowns));
+        let at = self.context.threads.install(|| self.problem.model.at(unknowns));
         let objective = self.objective_at(unknowns, &*at);
         (at, objective)
     }
 
     /// Returns the objective at an evaluated model.
     pub(super) fn objective_at(&self, unknowns: &[f64], at: &dyn Evaluated) -> f64 {
-        self.problem.objective(unknowns, &self.problem.residuals_at(self.threads, at), self.options.loss)
+        self.problem.objective(
+            unknowns,
+            &self.problem.residuals_at(self.context.threads, at),
+            self.options.loss,
+        )
     }
 
     pub(super) fn form(&mut self, unknowns: Vec<f64>, damping: f64) -> Result<Iterate<'a>, AdjustError> {
@@ -255,7 +244,7 @@ impl<'a> Run<'a, '_> {
             true => self.at_its_target(unknowns),
             false => (unknowns, None, None),
         };
-        let at = self.threads.install(|| self.problem.model.at(&unknowns));
+        let at = self.context.threads.install(|| self.problem.model.at(&unknowns));
         let mut state = self.formed(unknowns, at, damping)?;
         state.linearized.basis = basis;
         Ok(Iterate { before, ..state })
@@ -275,7 +264,7 @@ impl<'a> Run<'a, '_> {
     fn at_its_target(&mut self, unknowns: Vec<f64>) -> (Vec<f64>, Option<Basis>, Option<Vec<f64>>) {
         let Some((datum, reference)) = self.requests.datum else { return (unknowns, None, None) };
         let adjusted = Adjusted { unknowns: &unknowns, held: &self.datum, loss: None };
-        match moved(self.problem, adjusted, datum, reference, self.threads) {
+        match moved(self.problem, adjusted, datum, reference, self.context.threads) {
             Ok((there, basis)) => {
                 self.has_moved = true;
                 (there, Some(basis), Some(unknowns))
@@ -295,11 +284,8 @@ impl<'a> Run<'a, '_> {
         let equations =
             ObservationEquations::evaluated(self.problem, at, &unknowns, &self.datum, reweighting);
         let held = self.datum.clone();
-        let mut linearized = {
-            let mut between = between(&mut *self.watch, Phase::Form, self.problem.layout().locals());
-            let options = FactorOptions { damping, ..FactorOptions::default() };
-            Linearized::of(&equations, unknowns, held, &options, self.threads, &mut between)?
-        };
+        let options = FactorOptions { damping, ..FactorOptions::default() };
+        let mut linearized = Linearized::of(&equations, unknowns, held, &options, &mut self.context)?;
         self.seconds.add(&std::mem::take(&mut linearized.seconds));
         self.formations += 1;
         if self.options.loss.is_some() {
@@ -321,7 +307,7 @@ impl<'a> Run<'a, '_> {
             basis.into_iter().for_each(|basis| basis.take(step));
             problem.model.advance(&mut unknowns, step);
         }
-        let mut adjustment = Adjustment::at(problem, options.loss, unknowns, self.threads);
+        let mut adjustment = Adjustment::at(problem, options.loss, unknowns, self.context.threads);
         if let Some((last, _)) = end.last {
             let reached = &adjustment.unknowns;
             let sum_of_squares = problem.objective(reached, &adjustment.residuals, options.loss);
@@ -330,20 +316,15 @@ impl<'a> Run<'a, '_> {
         drop(end.unknowns);
         let asked = options.covariance && (self.requests.datum.is_none() || is_at_target);
         if let Some(Iterate { equations, mut linearized, .. }) = end.state.filter(|_| asked) {
-            let locals = problem.layout().locals();
-            {
-                let mut between = between(&mut *self.watch, Phase::Solve, locals);
-                linearized.take_to_datum(&equations, self.threads, &mut between)?;
-            }
+            linearized.take_to_datum(&equations, &mut self.context)?;
             if let Some((joint, memory)) = self.requests.by_groups.filter(|(joint, _)| !joint.is_empty()) {
-                let mut between = between(&mut *self.watch, Phase::Invert, locals);
-                adjustment.joint = linearized.joint(problem, joint, memory, self.threads, &mut between)?;
+                adjustment.joint = linearized.joint(problem, joint, memory, &mut self.context)?;
             }
-            adjustment.factor = self.requests.by_groups.and_then(|_| linearized.small_factor(self.threads));
+            adjustment.factor =
+                self.requests.by_groups.and_then(|_| linearized.small_factor(self.context.threads));
             let what =
                 InvertOptions { by_groups: self.requests.by_groups.is_some(), ..InvertOptions::default() };
-            let mut between = between(&mut *self.watch, Phase::Invert, locals);
-            adjustment.put(problem, linearized.invert(&equations, &what, self.threads, &mut between)?);
+            adjustment.put(problem, linearized.invert(&equations, &what, &mut self.context)?);
             adjustment.redundancy_excess = options.loss.is_none().then(|| adjustment.excess());
         }
         adjustment.effort.seconds.add(&self.seconds);
@@ -390,14 +371,7 @@ impl<'a> Run<'a, '_> {
             self.history.push(corrected);
         }
         self.iterations.push(iteration);
-        stopped((self.watch)(Event::Iteration(iteration)))
-    }
-}
-
-fn stopped(flow: ControlFlow<()>) -> Result<(), AdjustError> {
-    match flow {
-        ControlFlow::Continue(()) => Ok(()),
-        ControlFlow::Break(()) => Err(Stopped::Interrupted.into()),
+        Ok(self.context.report(Event::Iteration(iteration))?)
     }
 }
 
@@ -438,13 +412,4 @@ impl<'a> Run<'a, '_> {
         }
         self.stay(state, Status::NotConverged)
     }
-}
-
-/// Reports finished local blocks.
-pub fn between(
-    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    phase: Phase,
-    total: usize,
-) -> impl FnMut(usize) -> ControlFlow<()> {
-    move |done| watch(Event::Progress { phase, done, total })
 }

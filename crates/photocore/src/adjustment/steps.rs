@@ -11,10 +11,11 @@
 use std::ops::ControlFlow;
 
 use super::control::{BENDS, Control, Damping, FAR, MOST_DAMPING, ROUNDING, SHORT, STILL};
-use super::options::{Iteration, NEGLIGIBLE, Status, Stop};
+use super::options::{NEGLIGIBLE, Status, Stop};
 use super::problem::Evaluated;
 use super::result::AdjustError;
 use super::run::{End, Iterate, Next, Run};
+use crate::Iteration;
 
 /// Reciprocal of the fraction of groups that may leave the layout before convergence.
 const FEW: usize = 20;
@@ -126,7 +127,7 @@ impl<'a> Run<'a, '_> {
         }
         let predicted = match control.always() {
             false => change * change,
-            true => state.equations.decrease(self.threads, &step),
+            true => state.equations.decrease(self.context.threads, &step),
         };
         let accelerated = self.accelerated(&state, &step, iteration, predicted, control)?;
         let iteration = accelerated.iteration;
@@ -199,7 +200,7 @@ impl<'a> Run<'a, '_> {
             control.is_whole(iteration.damping) && control.stop.at_decrease(decrease, sum_of_squares);
         let short = control.always() && iteration.largest_change < SHORT;
         if iteration.damping > 0.0 {
-            self.collapsed = self.threads.install(|| match reached.at().collapsed(before) {
+            self.collapsed = self.context.threads.install(|| match reached.at().collapsed(before) {
                 none if none.is_empty() && short => reached.at().run_off(before),
                 found => found,
             });
@@ -257,7 +258,7 @@ impl<'a> Run<'a, '_> {
         let most = if short { 0 } else { self.problem.layout().groups() / FEW };
         step.damping == 0.0
             && self.problem.model.steps_swing()
-            && self.threads.install(|| self.problem.model.outgrown(values)) > most
+            && self.context.threads.install(|| self.problem.model.outgrown(values)) > most
     }
 
     /// Recomputes the local unknowns after a long step if that lowers the sum of squares.
@@ -266,7 +267,7 @@ impl<'a> Run<'a, '_> {
             return unknowns;
         }
         let mut other = unknowns.clone();
-        let relocated = self.threads.install(|| self.problem.model.relocate(&mut other));
+        let relocated = self.context.threads.install(|| self.problem.model.relocate(&mut other));
         let lower = relocated && self.objective(&other) < self.objective(&unknowns);
         if lower { other } else { unknowns }
     }

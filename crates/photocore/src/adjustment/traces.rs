@@ -3,8 +3,7 @@
 use super::linearized::Linearized;
 use super::problem::AnyProblem;
 use super::result::AdjustError;
-use crate::normals::Between;
-use crate::{Threads, parallel};
+use crate::{Context, parallel};
 
 /// Options of the sums over R.
 #[derive(Debug, Clone, Copy)]
@@ -146,13 +145,12 @@ impl Linearized {
         problem: &AnyProblem<'_>,
         groups: &EquationGroups,
         probing: &Probing,
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<GroupSquares, AdjustError> {
         let (numbered, count) = (Numbered::new(groups, &self.is_equation(problem)), groups.count);
         let (columns, exact) = numbered.columns(count, probing);
         let mut squares = vec![0.0; (count + 1) * count];
-        self.probe(problem, &numbered, (&columns, count), threads, between, |column, sums| {
+        self.probe(problem, &numbered, (&columns, count), context, |column, sums| {
             for (group, sum) in sums.iter().enumerate() {
                 squares[group * count + column.class] += column.weight * sum;
             }
@@ -171,14 +169,13 @@ impl Linearized {
         groups: &EquationGroups,
         classes: usize,
         probing: &Probing,
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Vec<f64>, AdjustError> {
         let (numbered, classes) = (Numbered::new(groups, &self.is_equation(problem)), classes.max(1));
         let (columns, _) = numbered.columns(classes.min(groups.count), probing);
         let classes = classes.min(groups.count).max(1);
         let mut squares = vec![0.0; groups.count];
-        self.probe(problem, &numbered, (&columns, classes), threads, between, |column, sums| {
+        self.probe(problem, &numbered, (&columns, classes), context, |column, sums| {
             for (own, sum) in squares.iter_mut().zip(sums).skip(column.class).step_by(classes) {
                 *own += column.weight * sum;
             }
@@ -192,19 +189,19 @@ impl Linearized {
         problem: &AnyProblem<'_>,
         numbered: &Numbered<'_>,
         (columns, classes): (&[ProbeColumn], usize),
-        threads: &Threads,
-        between: Between<'_>,
+        context: &mut Context<'_>,
         mut tell: impl FnMut(ProbeColumn, &[f64]),
     ) -> Result<(), AdjustError> {
         let height = problem.equations().max(1);
         for together in columns.chunks((TOGETHER / height).clamp(1, COLUMNS)) {
             let mut z = vec![0.0; together.len() * height];
-            threads.install(|| {
+            context.threads.install(|| {
                 parallel::each_chunk(&mut z, height, &|k, z| numbered.write(together[k], classes, z));
             });
-            let u = self.project(problem, z, threads, between)?;
-            let sums: Vec<Vec<f64>> =
-                threads.install(|| parallel::map_each(u.chunks(height).collect(), &|u| numbered.sums(u)));
+            let u = self.project(problem, z, context)?;
+            let sums: Vec<Vec<f64>> = context
+                .threads
+                .install(|| parallel::map_each(u.chunks(height).collect(), &|u| numbered.sums(u)));
             together.iter().zip(&sums).for_each(|(&column, sums)| tell(column, sums));
         }
         Ok(())

@@ -10,8 +10,8 @@ use super::problem::{Assembled, Reached};
 use super::screens::{Begin, Ended, Screening};
 use super::solution::{Joint, Solution};
 use super::trial::Converged;
-use crate::Threads;
-use crate::adjustment::{self, AdjustError, Adjustment, Method, Phase, Requests, Watch, between};
+use crate::adjustment::{self, AdjustError, Adjustment, Method, Requests};
+use crate::{Context, Threads};
 
 /// An adjustment to be run: initial state, threads, progress function and datum.
 ///
@@ -29,8 +29,6 @@ pub struct NetworkAdjustment<'a> {
     datum: Option<&'a InnerConstraints>,
     /// Points with joint cofactors; Some if the results for tests are stored.
     keep: Option<&'a [usize]>,
-    threads: Option<&'a Threads>,
-    watch: Option<Watch<'a>>,
 }
 
 impl<'a> NetworkAdjustment<'a> {
@@ -58,39 +56,20 @@ impl<'a> NetworkAdjustment<'a> {
         self
     }
 
-    /// Uses threads of the caller; by default new ones are started.
-    #[must_use]
-    pub fn on(mut self, threads: &'a Threads) -> Self {
-        self.threads = Some(threads);
-        self
+    /// Runs the adjustment on threads of its own ([`NetworkAdjustment::run_in`]).
+    ///
+    /// # Errors
+    /// The errors of [`NetworkAdjustment::run_in`], or threads that cannot be started.
+    pub fn run(&self) -> Result<Solution, NetworkError> {
+        self.run_in(&mut Context::new(&Threads::new(self.options.adjustment.threads)?))
     }
 
-    /// Reports progress to `watch` on the calling thread; the adjustment stops if it returns a break.
-    #[must_use]
-    pub fn watched(mut self, watch: Watch<'a>) -> Self {
-        self.watch = Some(watch);
-        self
-    }
-
-    /// Runs the adjustment.
+    /// Runs the adjustment on threads of the caller, with progress.
     ///
     /// # Errors
     /// An inconsistent or empty network, undetermined parameters, a state of another network. A datum for a network that is not free, or
-    /// that its points and photos cannot define. An interruption, threads that cannot be started.
-    pub fn run(mut self) -> Result<Solution, NetworkError> {
-        let own;
-        let threads = match self.threads {
-            Some(threads) => threads,
-            None => {
-                own = Threads::new(self.options.adjustment.threads)?;
-                &own
-            }
-        };
-        let watch = self.watch.take();
-        self.adjusted(threads, watch.unwrap_or(&mut adjustment::go_on))
-    }
-
-    fn adjusted(&self, threads: &Threads, watch: Watch<'_>) -> Result<Solution, NetworkError> {
+    /// that its points and photos cannot define. An interruption.
+    pub fn run_in(&self, context: &mut Context<'_>) -> Result<Solution, NetworkError> {
         let Self { network, options, datum, .. } = self;
         network.check()?;
         let mut start = self.state;
@@ -98,14 +77,15 @@ impl<'a> NetworkAdjustment<'a> {
         let mut before: Option<(Adjustment, Reached)> = None;
         loop {
             let reached = before.as_ref().map(|(_, reached)| reached);
-            let mut assembled = network.assembled(options, &screening.leaving.left_out, reached, threads)?;
+            let mut assembled =
+                network.assembled(options, &screening.leaving.left_out, reached, context.threads)?;
             if let Some(state) = start.take() {
                 assembled.go_on_from(state)?;
             }
             datum.map_or(Ok(()), |inner| network.check_carriers(inner, &assembled))?;
             let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
             let joint = self.keep.map(|points| assembled.taking_part(points));
-            let ended = self.iterated(&assembled, joint.as_deref(), done, threads, watch);
+            let ended = self.iterated(&assembled, joint.as_deref(), done, context);
             let reopened = ended.as_ref().ok().and_then(|ended| reopened(&assembled, ended));
             let look = || screening.look(&Ended { adjusted: &ended, assembled: &assembled, options });
             let begin = reopened.or_else(look);
@@ -119,11 +99,11 @@ impl<'a> NetworkAdjustment<'a> {
                 }
                 (None, Ok(mut ended)) => {
                     ended.go_on_from(before.map(|(earlier, _)| earlier));
-                    return self.solved(joint, assembled, ended, screening, threads, watch);
+                    return self.solved(joint, assembled, ended, screening, context);
                 }
                 (_, Err(error)) => {
                     let error = NetworkError::new(error, &assembled);
-                    return Err(network.name(error, &assembled, &assembled.problem.initial, threads));
+                    return Err(network.name(error, &assembled, &assembled.problem.initial, context.threads));
                 }
             }
         }
@@ -135,8 +115,7 @@ impl<'a> NetworkAdjustment<'a> {
         assembled: &Assembled,
         joint: Option<&[(usize, usize)]>,
         done: usize,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Adjustment, AdjustError> {
         let (problem, mut own) = (&assembled.problem, self.options.adjustment);
         own.max_iterations = own.max_iterations.saturating_sub(done);
@@ -158,15 +137,16 @@ impl<'a> NetworkAdjustment<'a> {
             None => {}
         }
         let by_groups = self.datum.is_none() && plain && !matches!(own.method, Method::Full(_));
-        let joint = joint.filter(|_| by_groups && assembled.may_keep(&self.options, threads)).map(|points| {
-            let unknowns = |&(_, place): &(usize, usize)| problem.model.of_point(place);
-            points.iter().flat_map(unknowns).collect::<Vec<usize>>()
-        });
+        let joint =
+            joint.filter(|_| by_groups && assembled.may_keep(&self.options, context.threads)).map(|points| {
+                let unknowns = |&(_, place): &(usize, usize)| problem.model.of_point(place);
+                points.iter().flat_map(unknowns).collect::<Vec<usize>>()
+            });
         if self.options.photo_corrections {
             requests.history = problem.model.blocks.first[self.network.photos.len()];
         }
         requests.by_groups = joint.as_deref().map(|joint| (joint, self.options.memory));
-        adjustment::adjust_with(problem, &own, requests, threads, watch)
+        adjustment::adjust_with(problem, &own, requests, context)
     }
 
     /// Returns the solution in the requested datum.
@@ -176,14 +156,11 @@ impl<'a> NetworkAdjustment<'a> {
         assembled: Assembled,
         mut ended: Adjustment,
         Screening { leaving, .. }: Screening,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Solution, NetworkError> {
         let Self { network, options, datum, .. } = self;
         let lost = match (ended.lost, datum) {
-            (None, Some(inner)) => {
-                take_to(inner, &options.adjustment, &assembled, &mut ended, threads, watch)?
-            }
+            (None, Some(inner)) => take_to(inner, &options.adjustment, &assembled, &mut ended, context)?,
             (lost, _) => lost.unwrap_or(0.0),
         };
         let joint = joint.zip(ended.joint.take()).map(|(points, found)| {
@@ -192,12 +169,13 @@ impl<'a> NetworkAdjustment<'a> {
         });
         let left_out = &leaving.left_out.points;
         let collapsed = (0..left_out.len()).filter(|&point| left_out[point]).collect();
-        let minimal = datum.is_none() && assembled.is_minimal(&ended.unknowns, threads);
-        let (mut solution, found) =
-            threads.install(|| Solution::with_leverages(network, options, &assembled, ended, collapsed));
+        let minimal = datum.is_none() && assembled.is_minimal(&ended.unknowns, context.threads);
+        let (mut solution, found) = context
+            .threads
+            .install(|| Solution::with_leverages(network, options, &assembled, ended, collapsed));
         let undetermined = solution.undetermined.take();
-        solution.undetermined =
-            undetermined.map(|error| network.name(error, &assembled, &solution.state.unknowns, threads));
+        solution.undetermined = undetermined
+            .map(|error| network.name(error, &assembled, &solution.state.unknowns, context.threads));
         solution.datum.minimal_control = minimal;
         solution.state.datum = datum.cloned().map(NetworkDatum::Inner);
         solution.datum.relative_error = lost;
@@ -222,17 +200,9 @@ impl Network {
         self.adjustment(options).run()
     }
 
-    /// Returns an adjustment with further options: initial state, threads, progress function and datum.
+    /// Returns an adjustment with further options: initial state and datum.
     pub fn adjustment(&self, options: &Options) -> NetworkAdjustment<'_> {
-        NetworkAdjustment {
-            network: self,
-            options: *options,
-            state: None,
-            datum: None,
-            keep: None,
-            threads: None,
-            watch: None,
-        }
+        NetworkAdjustment { network: self, options: *options, state: None, datum: None, keep: None }
     }
 }
 
@@ -247,11 +217,9 @@ fn take_to(
     options: &adjustment::Options,
     assembled: &Assembled,
     adjusted: &mut Adjustment,
-    threads: &Threads,
-    watch: Watch<'_>,
+    context: &mut Context<'_>,
 ) -> Result<f64, NetworkError> {
     let (datum, reference) = assembled.datum(inner);
-    let mut between = between(watch, Phase::Invert, assembled.points.len());
     let problem = &assembled.problem;
-    Ok(adjusted.take_to(problem, options, &datum, &reference, threads, &mut between)?)
+    Ok(adjusted.take_to(problem, options, &datum, &reference, context)?)
 }

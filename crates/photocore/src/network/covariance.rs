@@ -1,6 +1,5 @@
 //! Covariances between any parameters of an adjusted network, and datum transformations without a new adjustment.
 
-use std::ops::ControlFlow;
 use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, Matrix6, Matrix6xX};
@@ -11,12 +10,10 @@ use super::model::Owner;
 use super::problem::Assembled;
 use super::solution::Solution;
 use super::test_groups::TestGroups;
-use crate::Threads;
-use crate::adjustment::{
-    Adjusted, Adjustment, Classes, CofactorError, Datum, Linearized, Phase, Watch, between,
-};
+use crate::adjustment::{Adjusted, Adjustment, Classes, CofactorError, Datum, Linearized};
 use crate::geometry::{AttitudeNumbers, Matrix3, POSE, PoseNumbers};
 use crate::normals::Function;
+use crate::{Context, Threads};
 
 /// Smallest share that is not attributed to rounding.
 const NOTABLE: f64 = 1e-6;
@@ -64,36 +61,25 @@ impl Network {
         options: &Options,
         state: &State,
         datum: Option<&NetworkDatum>,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Covariances, NetworkError> {
         if state.released {
             let free = State { released: false, ..state.clone() };
-            return self.without_control().covariances(options, &free, datum, threads, watch);
+            return self.without_control().covariances(options, &free, datum, context);
         }
-        let assembled = self.assembled_again(options, state, threads)?;
+        let assembled = self.assembled_again(options, state, context.threads)?;
         let datum = datum.or(state.datum.as_ref());
-        let linearized = {
-            let mut between = between(watch, Phase::Form, assembled.problem.layout().locals());
-            let adjusted = state.adjusted(options);
-            match datum {
-                None => {
-                    let (values, held) = (state.unknowns.clone(), state.held.clone());
-                    Linearized::form(&assembled.problem, adjusted.loss, values, held, threads, &mut between)
-                        .and_then(Linearized::determined)
-                        .map_err(|error| NetworkError::new(error, &assembled))?
-                }
-                Some(datum) => {
-                    let (datum, _) = self.datum(&assembled, datum)?;
-                    Linearized::in_datum(
-                        &assembled.problem,
-                        adjusted,
-                        &datum,
-                        &state.unknowns,
-                        threads,
-                        &mut between,
-                    )?
-                }
+        let (problem, adjusted) = (&assembled.problem, state.adjusted(options));
+        let linearized = match datum {
+            None => {
+                let (values, held) = (state.unknowns.clone(), state.held.clone());
+                Linearized::form(problem, adjusted.loss, values, held, context)
+                    .and_then(Linearized::determined)
+                    .map_err(|error| NetworkError::new(error, &assembled))?
+            }
+            Some(datum) => {
+                let (datum, _) = self.datum(&assembled, datum)?;
+                Linearized::in_datum(problem, adjusted, &datum, &state.unknowns, context)?
             }
         };
         let point = assembled.places(self.points.len());
@@ -123,31 +109,27 @@ impl Network {
         options: &Options,
         state: &State,
         datum: &NetworkDatum,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Solution, NetworkError> {
-        let assembled = self.assembled_again(options, state, threads)?;
+        let assembled = self.assembled_again(options, state, context.threads)?;
         let is_inner = matches!(datum, NetworkDatum::Inner(_));
-        if state.released || is_inner && assembled.is_minimal(&state.unknowns, threads) {
+        if state.released || is_inner && assembled.is_minimal(&state.unknowns, context.threads) {
             let free = self.without_control();
-            let state = free.released(options, state, threads)?;
-            let mut solution = free.in_datum(options, &state, datum, threads, watch)?;
+            let state = free.released(options, state, context.threads)?;
+            let mut solution = free.in_datum(options, &state, datum, context)?;
             solution.state.released = true;
             return Ok(solution);
         }
         let (carried, reference) = self.datum(&assembled, datum)?;
         let reference = reference.as_ref().unwrap_or(&state.unknowns);
         let (problem, adjusted) = (&assembled.problem, state.adjusted(options));
-        let found =
-            {
-                let mut between = between(watch, Phase::Form, problem.layout().locals());
-                Linearized::in_datum(problem, adjusted, &carried, reference, threads, &mut between)?
-                    .inverted(problem, threads, &mut between)?
-            };
-        let adjustment = Adjustment::inverted(problem, adjusted.loss, found, threads);
+        let linearized = Linearized::in_datum(problem, adjusted, &carried, reference, context)?;
+        let found = linearized.inverted(problem, context)?;
+        let adjustment = Adjustment::inverted(problem, adjusted.loss, found, context.threads);
         let lost = adjustment.lost.unwrap_or(0.0);
         let left_out = state.collapsed.clone();
-        let mut solution = threads.install(|| Solution::new(self, options, &assembled, adjustment, left_out));
+        let mut solution =
+            context.threads.install(|| Solution::new(self, options, &assembled, adjustment, left_out));
         solution.state.datum = Some(datum.clone());
         solution.datum.relative_error = lost;
         Ok(solution)
@@ -258,12 +240,11 @@ impl Covariances {
         &self,
         rows: &[Of],
         columns: Option<&[Of]>,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<DMatrix<f64>, NetworkError> {
         let rows = self.unknowns(rows)?;
         let columns = columns.map(|columns| self.unknowns(columns)).transpose()?;
-        self.of_functions(&rows, columns.as_deref(), threads, watch)
+        self.of_functions(&rows, columns.as_deref(), context)
     }
 
     /// Returns J Q J^T for partials J of functions of the parameters of `of`: one row per function.
@@ -274,11 +255,10 @@ impl Covariances {
         &self,
         partials: &[f64],
         of: &[Of],
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<DMatrix<f64>, NetworkError> {
         let functions = self.functions(partials, of)?;
-        self.of_functions(&functions, None, threads, watch)
+        self.of_functions(&functions, None, context)
     }
 
     /// Returns linear functions of the parameters of `of`, from one row of partials each.
@@ -309,8 +289,8 @@ impl Covariances {
         let solve = |function: &Function| {
             let mut right = vec![0.0; problem.layout().unknowns()];
             function.iter().for_each(|&(unknown, value)| right[unknown] += value);
-            let go_on = &mut |_| ControlFlow::Continue(());
-            let found = self.linearized.solve_for(problem, &right, threads, go_on);
+            let context = &mut Context::new(threads);
+            let found = self.linearized.solve_for(problem, &right, context);
             found.map_err(|error| NetworkError::new(error, &self.assembled))
         };
         self.functions(partials, of)?.iter().map(solve).collect()
@@ -320,12 +300,10 @@ impl Covariances {
         &self,
         rows: &[Function],
         columns: Option<&[Function]>,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<DMatrix<f64>, NetworkError> {
         let problem = &self.assembled.problem;
-        let mut between = between(watch, Phase::Invert, problem.layout().locals());
-        let found = self.linearized.cofactors(problem, rows, columns, self.memory, threads, &mut between);
+        let found = self.linearized.cofactors(problem, rows, columns, self.memory, context);
         let found = found.map_err(|error| match error {
             CofactorError::Adjust(error) => NetworkError::new(error, &self.assembled),
             refused => NetworkError::Cofactors(refused),

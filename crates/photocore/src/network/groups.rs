@@ -3,12 +3,9 @@
 use super::covariance::Covariances;
 use super::error::NetworkError;
 use super::model::Owner;
-use crate::Threads;
-use crate::adjustment::{
-    AdjustError, AnyProblem, EquationGroups, GroupSquares, Phase, Probing, Watch, between,
-};
+use crate::Context;
+use crate::adjustment::{EquationGroups, GroupSquares, Probing};
 use crate::geometry::POSE;
-use crate::normals::Between;
 
 /// Group number of each observation, in the order of the network; a number of `count` or more means none.
 #[derive(Debug, Clone, Default)]
@@ -38,13 +35,11 @@ impl Covariances {
         &self,
         groups: &Groups,
         probing: &Probing,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<GroupSquares, NetworkError> {
         let groups = self.equation_groups(groups)?;
-        self.solved(watch, |problem, between| {
-            self.linearized.group_squares(problem, &groups, probing, threads, between)
-        })
+        let found = self.linearized.group_squares(&self.assembled.problem, &groups, probing, context);
+        found.map_err(|error| NetworkError::new(error, &self.assembled))
     }
 
     /// Returns the sums within each of many groups, in `classes` column classes (see [`crate::adjustment::Linearized::own_squares`]).
@@ -56,13 +51,11 @@ impl Covariances {
         groups: &Groups,
         classes: usize,
         probing: &Probing,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
         let groups = self.equation_groups(groups)?;
-        self.solved(watch, |problem, between| {
-            self.linearized.own_squares(problem, &groups, classes, probing, threads, between)
-        })
+        let found = self.linearized.own_squares(&self.assembled.problem, &groups, classes, probing, context);
+        found.map_err(|error| NetworkError::new(error, &self.assembled))
     }
 
     /// Returns the residuals that errors of the images cause, both in standard deviations. Columns contain x and y of every image, column
@@ -73,8 +66,7 @@ impl Covariances {
     pub fn project_images(
         &self,
         columns: &[f64],
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Vec<f64>, NetworkError> {
         let problem = &self.assembled.problem;
         let (width, height) = (2 * self.images, problem.equations());
@@ -88,8 +80,8 @@ impl Covariances {
                 z[2 * row..][..2].copy_from_slice(&column[2 * image..][..2]);
             }
         }
-        let u =
-            self.solved(watch, |problem, between| self.linearized.project(problem, z, threads, between))?;
+        let u = self.linearized.project(problem, z, context);
+        let u = u.map_err(|error| NetworkError::new(error, &self.assembled))?;
         let mut found = vec![0.0; columns.len()];
         for (found, u) in found.chunks_exact_mut(width).zip(u.chunks_exact(height)) {
             for (row, &image) in order.iter().enumerate() {
@@ -97,17 +89,6 @@ impl Covariances {
             }
         }
         Ok(found)
-    }
-
-    /// Solves with the factored equations.
-    fn solved<T>(
-        &self,
-        watch: Watch<'_>,
-        solve: impl FnOnce(&AnyProblem<'_>, Between<'_>) -> Result<T, AdjustError>,
-    ) -> Result<T, NetworkError> {
-        let problem = self.assembled.problem.any();
-        let mut between = between(watch, Phase::Solve, problem.layout().locals());
-        solve(problem, &mut between).map_err(|error| NetworkError::new(error, &self.assembled))
     }
 
     /// Returns the groups of the equations of the adjustment.

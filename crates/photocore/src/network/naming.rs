@@ -1,14 +1,12 @@
 //! Description of undetermined parameter combinations in terms of photogrammetry: camera parameters and parts of poses.
 
-use std::ops::ControlFlow;
-
 use super::error::{Combination, NetworkError, PosePart};
 use super::input::Network;
 use super::model::Owner;
 use super::problem::Assembled;
-use crate::Threads;
 use crate::adjustment::{AdjustError, Linearized};
 use crate::geometry::{PoseNumbers, Vector3};
+use crate::{Context, Threads};
 
 /// Minimum share of the sum of n_ii x_i^2 for parameters that are named.
 const NOTABLE: f64 = 0.01;
@@ -76,8 +74,8 @@ impl Network {
         }
         let problem = &assembled.problem;
         let held = problem.any().to_hold(values, threads);
-        let between = &mut |_| ControlFlow::Continue(());
-        let Ok(linearized) = Linearized::form(problem, None, values.to_vec(), held, threads, between) else {
+        let context = &mut Context::new(threads);
+        let Ok(linearized) = Linearized::form(problem, None, values.to_vec(), held, context) else {
             return error;
         };
         let named = linearized.combinations();

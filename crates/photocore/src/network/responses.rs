@@ -1,7 +1,7 @@
 //! Effects of single observations: columns of R, effects on chosen parameters and own points, and inseparable observations. Effects on other
 //! parameters require a solution of the normal equations.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 use std::sync::Arc;
 
 use nalgebra::DMatrix;
@@ -16,7 +16,7 @@ use crate::adjustment::{
     AdjustError, Linearized, ObservationRows, correlation_above, leverage_odds, may_correlate, whitening,
 };
 use crate::normals::RowCofactors;
-use crate::{Threads, parallel};
+use crate::{Context, Threads, parallel};
 
 /// Number of right-hand sides per batch.
 const TOGETHER: usize = 16;
@@ -59,10 +59,10 @@ impl Trial {
     /// Responses before any adjustment; an interruption, insufficient memory.
     pub fn responses(&self, groups: &[usize], threads: &Threads) -> Result<Vec<f64>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
-        let go_on = &mut |_| ControlFlow::Continue(());
+        let context = &mut Context::new(threads);
         let failed = |error: AdjustError| NetworkError::new(error, &self.assembled);
         let (values, held) = (found.values.clone(), found.held.clone());
-        let linearized = Linearized::form(problem, None, values, held, threads, go_on).map_err(failed)?;
+        let linearized = Linearized::form(problem, None, values, held, context).map_err(failed)?;
         let equations = ObservationRows::new(problem, &found.values, &found.held, threads);
         let unknowns = problem.layout().unknowns();
         let all: Vec<usize> = self.groups.equations().iter().map(|&equation| equation as usize).collect();
@@ -70,7 +70,7 @@ impl Trial {
         let mut columns = Vec::with_capacity(all.len() * asked.len());
         for some in asked.chunks(TOGETHER) {
             let rights: Vec<f64> = some.iter().flat_map(|&row| equations.right(all[row], unknowns)).collect();
-            let solutions = linearized.solve_for(problem, &rights, threads, go_on).map_err(failed)?;
+            let solutions = linearized.solve_for(problem, &rights, context).map_err(failed)?;
             for (row, solution) in some.iter().zip(solutions.chunks_exact(unknowns)) {
                 let first = columns.len();
                 columns.extend(equations.times(&all, solution, threads).into_iter().map(|share| -share));

@@ -9,11 +9,11 @@ use super::error::NetworkError;
 use super::input::{Network, Options, State};
 use super::problem::Assembled;
 use super::test_groups::TestGroups;
-use crate::Threads;
 use crate::adjustment::{
-    self, AdjustError, EquationOf, Leverages, Loss, Method, Model, Requests, Status, Stop, Terms, Watch,
+    self, AdjustError, EquationOf, Leverages, Loss, Method, Model, Requests, Status, Stop, Terms,
 };
 use crate::geometry::PoseNumbers;
+use crate::{Context, Threads};
 
 /// Repeated adjustments of a network without some of its observations.
 #[derive(Debug)]
@@ -159,13 +159,13 @@ impl Trial {
     ///
     /// # Errors
     /// Undetermined parameters; an interruption, insufficient memory.
-    pub fn stand(&mut self, threads: &Threads, watch: Watch<'_>) -> Result<Outcome, NetworkError> {
+    pub fn stand(&mut self, context: &mut Context<'_>) -> Result<Outcome, NetworkError> {
         let found = match self.found.take_if(|_| self.stands) {
             Some(found) => found,
             None => {
                 self.take_out(&Excluded::default());
                 let problem = &self.assembled.problem;
-                Leverages::at(problem, problem.initial.clone(), self.held.clone(), threads, watch)
+                Leverages::at(problem, problem.initial.clone(), self.held.clone(), context)
                     .map_err(|error| NetworkError::new(error, &self.assembled))?
             }
         };
@@ -182,8 +182,7 @@ impl Trial {
         &mut self,
         out: &Excluded,
         tolerance: Option<f64>,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Outcome, NetworkError> {
         self.stands = false;
         self.take_out(out);
@@ -191,7 +190,7 @@ impl Trial {
         let options = adjustment::Options { method, covariance: true, loss: None, ..self.options };
         let failed = |error| NetworkError::new(error, &self.assembled);
         let requests = Requests { by_groups: Some((&[], None)), ..Requests::default() };
-        let adjusted = adjustment::adjust_with(&self.assembled.problem, &options, requests, threads, watch);
+        let adjusted = adjustment::adjust_with(&self.assembled.problem, &options, requests, context);
         let mut adjusted = adjusted.map_err(failed)?;
         let values = std::mem::take(&mut adjusted.unknowns);
         let Some(found) = Leverages::of(&mut adjusted, &values) else {
@@ -209,8 +208,7 @@ impl Trial {
         &mut self,
         loss: Loss,
         iterations: usize,
-        threads: &Threads,
-        watch: Watch<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Option<Vec<f64>>, NetworkError> {
         let options = adjustment::Options {
             loss: Some(loss),
@@ -220,7 +218,7 @@ impl Trial {
         };
         self.stands = false;
         let problem = &self.assembled.problem;
-        let found = adjustment::adjust(problem, &options, threads, watch)
+        let found = adjustment::adjust(problem, &options, context)
             .map_err(|error| NetworkError::new(error, &self.assembled))?;
         if found.status == Status::Diverged {
             return Ok(None);

@@ -9,8 +9,8 @@ use super::incidence::Batches;
 use super::panels::Handover;
 use super::system::System;
 use super::vectorised::LANES;
-use super::watch::Control;
 use super::workspace::reserved;
+use crate::context::Control;
 use crate::parallel;
 
 /// Input of a formation.

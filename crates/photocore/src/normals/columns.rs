@@ -8,8 +8,8 @@ use super::factor::Factor;
 use super::layout::LayoutError;
 use super::system::{System, SystemError};
 use super::vectorised::{LANES, dot};
-use super::watch::{Between, Control, watched};
-use crate::{Threads, parallel};
+use crate::context::{Context, Control, Phase};
+use crate::parallel;
 
 /// Right-hand sides of a part, C per pass, after forward substitution of its eliminated unknowns: y = L^-1 r.
 #[derive(Debug)]
@@ -65,15 +65,14 @@ impl Factor {
     /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn reduce_rights(
         &self,
-        threads: &Threads,
         equations: &dyn Equations,
         rights: &[f64],
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<ReducedRights, SystemError> {
         let system = &*self.system;
         equations.prior().check(&system.layout)?;
         system.layout.check_columns("rights", rights.len())?;
-        let reduced = watched(threads, between, |control| {
+        let reduced = context.run(Phase::Solve, system.layout.locals(), |control| {
             let elimination = self.elimination(equations, control);
             let counts = (system.symbolic.unknowns(), system.symbolic.outer_unknowns());
             let mut others = control.allocated(system.of_others(rights))?;
@@ -94,17 +93,16 @@ impl Factor {
     /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn solve_reduced_rights<const C: usize>(
         &self,
-        threads: &Threads,
         equations: &dyn Equations,
         mut reduced: ReducedRights<C>,
         outer: &[f64],
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Vec<f64>, SystemError> {
         let system = &*self.system;
         equations.prior().check(&system.layout)?;
         let required = reduced.products.len().isqrt() * system.symbolic.outer_unknowns();
         LayoutError::unless_of_length("outer", outer.len(), required)?;
-        let solved = watched(threads, between, |control| {
+        let solved = context.run(Phase::Solve, system.layout.locals(), |control| {
             let elimination = self.elimination(equations, control);
             reduced.put(outer);
             let ReducedRights { own, mut others, products, .. } = reduced;
@@ -145,15 +143,10 @@ impl Factor {
     ///
     /// # Errors
     /// Interruption, lack of memory, or lengths that contradict the layout.
-    pub fn chord(
-        &self,
-        threads: &Threads,
-        equations: &dyn Equations,
-        between: Between<'_>,
-    ) -> Result<Chord, SystemError> {
-        let rights = self.reduce_chord(threads, equations, &equations.prior().right, &mut *between)?;
+    pub fn chord(&self, equations: &dyn Equations, context: &mut Context<'_>) -> Result<Chord, SystemError> {
+        let rights = self.reduce_chord(equations, &equations.prior().right, context)?;
         let (reduced, decrease) = (rights.reduced(), rights.products[0]);
-        let step = self.solve_reduced_rights(threads, equations, rights, &[], between)?;
+        let step = self.solve_reduced_rights(equations, rights, &[], context)?;
         Ok(Chord { step, reduced, decrease })
     }
 
@@ -167,15 +160,14 @@ impl Factor {
     /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn reduce_chord(
         &self,
-        threads: &Threads,
         equations: &dyn Equations,
         rights: &[f64],
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<ReducedRights<1>, SystemError> {
         let system = &*self.system;
         equations.prior().check(&system.layout)?;
         LayoutError::unless_of_length("rights", rights.len(), system.layout.unknowns())?;
-        let reduced = watched(threads, between, |control| {
+        let reduced = context.run(Phase::Solve, system.layout.locals(), |control| {
             let counts = (system.symbolic.unknowns(), system.symbolic.outer_unknowns());
             let mut others = control.allocated(system.of_others(rights))?;
             system.add_rights_of_ties(equations, &mut others);

@@ -12,8 +12,8 @@ use pulp::Simd;
 
 use super::triangle::PIVOT_TOLERANCE;
 use super::vectorised::{Kernel, run_unsized};
-use super::watch::Control;
 use super::workspace::Workspace;
+use crate::context::Control;
 use crate::parallel;
 
 /// Number of columns per factorisation step.

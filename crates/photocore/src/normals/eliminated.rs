@@ -14,8 +14,8 @@ use super::panels::skip_ref;
 use super::system::System;
 use super::triangle::Triangle;
 use super::vectorised::{Kernel, Rows, dot_by_fours, dot_columns, run, size, subtract_rights};
-use super::watch::Control;
 use super::workspace::Eliminated;
+use crate::context::Control;
 use crate::parallel;
 
 /// Number of batches per task if they are eliminated again.

@@ -13,9 +13,8 @@ use super::front::Front;
 use super::panels::{Handover, Panels};
 use super::symbolic::Supernode;
 use super::system::{System, SystemError};
-use super::watch::{Between, Control, watched};
 use super::workspace::Eliminated;
-use crate::Threads;
+use crate::context::{Context, Control, Phase};
 use crate::parallel::lock;
 
 /// Options of the factorisation.
@@ -109,14 +108,13 @@ impl System {
     /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn factor(
         self: &Arc<Self>,
-        threads: &Threads,
         equations: &dyn Equations,
         options: &FactorOptions,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Factor, SystemError> {
         equations.prior().check(&self.layout)?;
         let FactorOptions { damping, cached } = *options;
-        let factored = watched(threads, between, |control| {
+        let factored = context.run(Phase::Form, self.layout.locals(), |control| {
             let caches = cached && self.caches;
             let formation = Formation { system: self, equations, damping, caches, control };
             let (mut given_up, mut passes) = (Vec::new(), 0);

@@ -18,9 +18,9 @@ use super::products::Products;
 use super::symbolic::Symbolic;
 use super::system::{System, SystemError};
 use super::vectorised::dot;
-use super::watch::{Between, Control, watched};
 use super::workspace::zeros;
-use crate::{Stopped, Threads, parallel};
+use crate::context::{Context, Control, Phase};
+use crate::{Stopped, parallel};
 
 /// Linear function of the unknowns: indices of unknowns with their coefficients.
 pub type Function = Vec<(usize, f64)>;
@@ -58,15 +58,14 @@ impl Factor {
     /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn reduce(
         &self,
-        threads: &Threads,
         equations: &dyn Equations,
         rows: &[Function],
         columns: Option<&[Function]>,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Functions, SystemError> {
         let system = &*self.system;
         equations.prior().check(&system.layout)?;
-        let reduced = watched(threads, between, |control| {
+        let reduced = context.run(Phase::Invert, self.system.layout.locals(), |control| {
             let places = system.symbolic.places(&system.layout);
             let work = Reduction { system, equations, places: &places, control };
             let rows = work.reduced(rows);
@@ -92,11 +91,10 @@ impl Factor {
     /// Interruption or lack of memory.
     pub fn cofactors_of(
         &self,
-        threads: &Threads,
         functions: &Functions,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Vec<f64>, Stopped> {
-        watched(threads, between, |control| {
+        context.run(Phase::Invert, self.system.layout.locals(), |control| {
             let rows = &functions.rows;
             let columns = functions.columns.as_ref().unwrap_or(rows);
             let mut matrix = control.allocated(zeros(rows.len() * columns.len()))?;

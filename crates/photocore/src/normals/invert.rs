@@ -17,8 +17,7 @@ use super::layout::LayoutError;
 use super::panels::{Handover, Panels, SelectedInverse};
 use super::symbolic::Symbolic;
 use super::system::{System, SystemError};
-use super::watch::{Between, Control, watched};
-use crate::Threads;
+use crate::context::{Context, Control, Phase};
 use crate::parallel::lock;
 
 /// Options of the inversion.
@@ -50,17 +49,17 @@ impl Factor {
     /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn invert(
         mut self,
-        threads: &Threads,
         equations: &dyn Equations,
         options: &InvertOptions<'_>,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Inversion, SystemError> {
         equations.prior().check(&self.system.layout)?;
         let outer = packed(self.system.symbolic.outer_unknowns());
         LayoutError::unless_of_length("InvertOptions::outer", options.outer.len(), outer)?;
         self.forget();
         let Self { system, mut panels, diagonal, .. } = self;
-        watched(threads, between, |control| {
+        let total = system.layout.locals();
+        context.run(Phase::Invert, total, |control| {
             let information = system.information(&diagonal);
             panels.reopen();
             Walk { system: &system, equations, options, control }.invert(panels, information)

@@ -118,16 +118,15 @@ impl System {
 mod tests {
     #![allow(clippy::unwrap_used)]
 
-    use std::ops::ControlFlow;
     use std::sync::Arc;
 
     use proptest::prelude::*;
 
     use super::*;
-    use crate::Threads;
     use crate::normals::{
         Equations, FactorOptions, GroupRows, InvertOptions, Layout, Ordering, Prior, SelectedInverse,
     };
+    use crate::{Context, Threads};
 
     struct Irregular {
         prior: Prior,
@@ -162,12 +161,12 @@ mod tests {
         let threads = Threads::new(threads).unwrap();
         let unknowns = system.layout.unknowns();
         let prior = Prior { weight: vec![1.0; unknowns], right: vec![0.0; unknowns], between: vec![] };
-        let mut go_on = |_| ControlFlow::Continue(());
+        let mut context = Context::new(&threads);
         let equations = Irregular { prior };
         system.release();
-        let factor = system.factor(&threads, &equations, &FactorOptions::UNCACHED, &mut go_on).unwrap();
+        let factor = system.factor(&equations, &FactorOptions::UNCACHED, &mut context).unwrap();
         let options = InvertOptions::default();
-        let inverse = factor.invert(&threads, &equations, &options, &mut go_on).unwrap();
+        let inverse = factor.invert(&equations, &options, &mut context).unwrap();
         (system.fronts(threads.count()), system.workspace.most(), inverse.selected)
     }
 

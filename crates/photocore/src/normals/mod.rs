@@ -17,9 +17,7 @@
 //! system that is cut near the root of its elimination tree is so solved in parts, with the same result (Helmert 1880; Wolf 1978).
 //!
 //! ```
-//! use std::ops::ControlFlow;
-//!
-//! use photocore::Threads;
+//! use photocore::{Context, Threads};
 //! use photocore::normals::{Equations, FactorOptions, GroupRows, Layout, Ordering, Prior, SolveOptions, System};
 //!
 //! /// x_local - y_retained = 1 for every pair.
@@ -43,10 +41,9 @@
 //! let prior = Prior { weight: vec![1.0, 0.0, 0.0, 0.0, 0.0], right: vec![0.0; 5], between: vec![] };
 //! let equations = Differences { prior };
 //! let threads = Threads::new(1)?;
-//! let mut go_on = |_| ControlFlow::Continue(());
-//! let (factoring, solving) = (FactorOptions::default(), SolveOptions::default());
-//! let factor = system.factor(&threads, &equations, &factoring, &mut go_on)?;
-//! let x = factor.solve(&threads, &equations, &solving, &mut go_on)?;
+//! let mut context = Context::new(&threads);
+//! let factor = system.factor(&equations, &FactorOptions::default(), &mut context)?;
+//! let x = factor.solve(&equations, &SolveOptions::default(), &mut context)?;
 //! assert!(x.iter().zip([0.0, 0.0, 0.0, -1.0, -1.0]).all(|(x, expected)| (x - expected).abs() < 1e-12));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -81,7 +78,6 @@ mod system;
 mod tree;
 mod triangle;
 mod vectorised;
-mod watch;
 mod workspace;
 
 pub use cofactors::Cofactors;
@@ -102,4 +98,3 @@ pub use solve::SolveOptions;
 pub use symbolic::{Operations, Symbolic};
 pub use system::{System, SystemError};
 pub(crate) use vectorised::{LANES, dot};
-pub use watch::Between;

@@ -9,8 +9,8 @@ use faer::{Accum, Mat, MatMut, MatRef, Par};
 
 use super::factor::Factor;
 use super::symbolic::Symbolic;
-use super::watch::Control;
 use super::workspace::zeros;
+use crate::context::Control;
 use crate::parallel;
 
 /// Right-hand sides, sorted by their first supernode.

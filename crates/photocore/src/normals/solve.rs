@@ -14,9 +14,9 @@ use super::layout::LayoutError;
 use super::panels::Panels;
 use super::system::{System, SystemError};
 use super::vectorised::{Kernel, LANES, dot_in_lanes, run_unsized};
-use super::watch::{Between, Control, watched};
 use super::workspace::{reserved, zeros};
-use crate::{Threads, parallel};
+use crate::context::{Context, Control, Phase};
+use crate::parallel;
 
 /// Options of the solution.
 #[derive(Debug, Clone, Copy, Default)]
@@ -42,10 +42,9 @@ impl Factor {
     /// Interruption, lack of memory, or lengths that contradict the layout.
     pub fn solve(
         &self,
-        threads: &Threads,
         equations: &dyn Equations,
         options: &SolveOptions<'_>,
-        between: Between<'_>,
+        context: &mut Context<'_>,
     ) -> Result<Vec<f64>, SystemError> {
         let System { layout, symbolic, .. } = &*self.system;
         equations.prior().check(layout)?;
@@ -56,7 +55,7 @@ impl Factor {
                 LayoutError::unless_of_length("SolveOptions::outer", options.outer.len(), outer)?;
             }
         }
-        let solved = watched(threads, between, |control| {
+        let solved = context.run(Phase::Solve, layout.locals(), |control| {
             let elimination = self.elimination(equations, control);
             match options.rights {
                 None => {

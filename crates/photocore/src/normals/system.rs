@@ -14,9 +14,9 @@ use super::ordering::Ordering;
 use super::symbolic::Symbolic;
 use super::tree::Tree;
 use super::triangle::Triangle;
-use super::watch::Control;
 use super::workspace::Workspace;
 use crate::Stopped;
+use crate::context::Control;
 
 /// Error of a phase of a system.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]

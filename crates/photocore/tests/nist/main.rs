@@ -5,14 +5,13 @@
 mod problems;
 
 use std::f64::consts::PI;
-use std::ops::ControlFlow;
 
 use num_complex::Complex64;
-use photocore::Threads;
 use photocore::adjustment::{
     AdjustError, Adjustment, Evaluated, Method, Model, Options, Problem, Status, Stop, adjust,
 };
 use photocore::normals::{GroupRows, Layout, Ordering, System};
+use photocore::{Context, Threads};
 
 use problems::{Certified, PROBLEMS};
 
@@ -92,7 +91,7 @@ fn run(certified: &Certified, start: &[f64], method: Method) -> Result<Adjustmen
     };
     let options = Options { method, max_iterations: 5000, covariance: true, loss: None, threads: 0 };
     let threads = Threads::new(1).unwrap();
-    adjust(&problem, &options, &threads, &mut |_| ControlFlow::Continue(()))
+    adjust(&problem, &options, &mut Context::new(&threads))
 }
 
 /// Returns the number of agreeing digits of the worst value.

@@ -6,12 +6,12 @@
 //!
 //! Interruption by the caller.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 
 use super::columns::{Cell, Column, Points, Table, Value};
 use super::fault::{Fault, Reason};
 use super::fields::{Field, Kind, MEASURE, number_or_absent};
-use photocore::Stopped;
+use photocore::{Context, Event, Phase};
 
 /// Encoding of the message lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,19 +25,19 @@ pub enum Framing<'a> {
 /// Reads the messages in a part of a file.
 ///
 /// # Errors
-/// An error with its point and byte, an interruption by `watch`, or lack of memory.
+/// An error with its point and byte, an interruption, or lack of memory.
 pub fn decoded(
     file: &[u8],
     part: Range<usize>,
     framing: Framing<'_>,
-    watch: Watch<'_>,
+    context: &mut Context<'_>,
 ) -> Result<Points<'static>, Fault> {
     let mut all = Points::default();
     let mut at = part.start;
     let end = part.end.min(file.len());
     while let Some(message) = next_message(file, at..end, framing, all.points.rows)? {
         let number = all.points.rows;
-        go_on(watch, number).map_err(|stopped| stopped.at_byte(at))?;
+        report(context, number).map_err(|stopped| stopped.at_byte(at))?;
         read_point(&file[message.clone()], message.start, &mut all)
             .map_err(|fault| fault.in_point(number))?;
         at = message.end;
@@ -147,12 +147,12 @@ fn cell<'a>(field: &Field, packet: &Packet<'a>) -> Result<Cell<'a>, Reason> {
 ///
 /// # Errors
 /// Inconsistent columns, content that only text can store, or a message longer than its length field allows.
-pub fn encoded(all: &Points<'_>, watch: Watch<'_>) -> Result<Vec<u8>, Fault> {
+pub fn encoded(all: &Points<'_>, context: &mut Context<'_>) -> Result<Vec<u8>, Fault> {
     all.check().map_err(Reason::of_columns)?;
     let (orders, mut to, mut own) = ((order(&all.points), order(&all.measures)), vec![], vec![]);
     for point in 0..all.points.rows {
         let fault = |reason: Reason| reason.of_columns().in_point(point);
-        go_on(watch, point).map_err(fault)?;
+        report(context, point).map_err(fault)?;
         let start = to.len();
         to.extend([0; 4]);
         let mut measures = |to: &mut Vec<u8>| {
@@ -398,16 +398,13 @@ pub fn put_bytes(number: u64, bytes: &[u8], to: &mut Vec<u8>) {
     to.extend_from_slice(bytes);
 }
 
-/// Callback that decides whether to continue.
-pub type Watch<'a> = &'a mut dyn FnMut() -> ControlFlow<()>;
-
-/// Number of points between two calls.
+/// Number of points between two reports of progress.
 const PATIENCE: usize = 1024;
 
-/// Calls `watch` once per `PATIENCE` points; fails if it breaks.
-pub fn go_on(watch: &mut dyn FnMut() -> ControlFlow<()>, point: usize) -> Result<(), Reason> {
-    match point.is_multiple_of(PATIENCE) && watch().is_break() {
-        true => Err(Stopped::Interrupted.into()),
-        false => Ok(()),
+/// Reports progress once per `PATIENCE` points; fails if this stops the work.
+pub fn report(context: &mut Context<'_>, point: usize) -> Result<(), Reason> {
+    if point.is_multiple_of(PATIENCE) {
+        context.report(Event::Progress { phase: Phase::Form, done: point, total: 0 })?;
     }
+    Ok(())
 }

@@ -15,7 +15,7 @@ mod text;
 pub use columns::{Column, Names, Points, Rest, Sparse, Table, Texts};
 pub use fault::{Fault, Place, Reason};
 pub use header::Header;
-pub use messages::{Framing, Watch, decoded, encoded};
+pub use messages::{Framing, decoded, encoded};
 pub use text::{read_text, text};
 
 #[cfg(test)]

@@ -5,14 +5,14 @@ use proptest::prelude::*;
 
 use super::messages::{Message, put_bytes, put_number, put_varint, put_whole};
 use super::{Fault, Framing, Header, Place, Points, Reason, decoded, encoded, read_text, text};
-use photocore::Stopped;
+use photocore::{Context, Stopped, Threads};
 
-fn go_on() -> ControlFlow<()> {
-    ControlFlow::Continue(())
+fn on_a_thread<T>(work: impl FnOnce(&mut Context<'_>) -> T) -> T {
+    work(&mut Context::new(&Threads::new(1).unwrap()))
 }
 
 fn read(file: &[u8]) -> Result<Points<'static>, Fault> {
-    decoded(file, 0..file.len(), Framing::Lengths, &mut go_on)
+    on_a_thread(|context| decoded(file, 0..file.len(), Framing::Lengths, context))
 }
 
 /// Returns a length-prefixed point: two measures, a false flag, an unknown field.
@@ -42,7 +42,7 @@ fn messages_come_back_byte_for_byte() {
     let file = [point("P"), point("Q")].concat();
     let all = read(&file).unwrap();
     assert_eq!((all.points.rows, all.measures.rows, &*all.firsts), (2, 4, &[0, 2, 4][..]));
-    assert_eq!(encoded(&all, &mut go_on).unwrap(), file);
+    assert_eq!(on_a_thread(|context| encoded(&all, context)).unwrap(), file);
 }
 
 #[test]
@@ -56,12 +56,13 @@ fn a_fault_names_its_point_and_byte() {
 #[test]
 fn whoever_watches_may_end_the_work() {
     let stopped = |fault: Fault| assert_eq!(fault.reason, Reason::Stopped(Stopped::Interrupted));
-    let mut end = || ControlFlow::Break(());
+    let (threads, mut end) = (Threads::new(1).unwrap(), |_| ControlFlow::Break(()));
+    let mut context = Context::with_progress(&threads, &mut end);
     let (file, all) = (point("P"), read(&point("P")).unwrap());
-    stopped(decoded(&file, 0..file.len(), Framing::Lengths, &mut end).unwrap_err());
-    stopped(encoded(&all, &mut end).unwrap_err());
-    stopped(read_text(b"Object = ControlPoint", &mut end).unwrap_err());
-    stopped(text(&all, &mut end).unwrap_err());
+    stopped(decoded(&file, 0..file.len(), Framing::Lengths, &mut context).unwrap_err());
+    stopped(encoded(&all, &mut context).unwrap_err());
+    stopped(read_text(b"Object = ControlPoint", &mut context).unwrap_err());
+    stopped(text(&all, &mut context).unwrap_err());
 }
 
 proptest! {
@@ -83,9 +84,9 @@ proptest! {
         }
         file.truncate(file.len() - cut % 3 * (cut % file.len()) / 2);
         if let Ok(all) = read(&file) {
-            let again = encoded(&all, &mut go_on).map(|written| read(&written));
+            let again = on_a_thread(|context| encoded(&all, context)).map(|written| read(&written));
             prop_assert!(again.is_ok_and(|again| again.is_ok_and(|again| again.measures.rows == all.measures.rows)));
-            let _ = text(&all, &mut go_on);
+            let _ = on_a_thread(|context| text(&all, context));
         }
         let _ = Header::decoded(&file, 4..file.len());
     }
@@ -99,9 +100,10 @@ proptest! {
             let at = at % file.len();
             file[at] = byte;
         }
-        if let Ok((all, _)) = read_text(&file, &mut go_on) {
-            let written = text(&all, &mut go_on);
-            prop_assert!(written.is_err() || read_text(written.unwrap_or_default().as_bytes(), &mut go_on).is_ok());
+        if let Ok((all, _)) = on_a_thread(|context| read_text(&file, context)) {
+            let written = on_a_thread(|context| text(&all, context));
+            let again = |text: String| on_a_thread(|context| read_text(text.as_bytes(), context).is_ok());
+            prop_assert!(written.map_or(true, again));
         }
     }
 }

@@ -8,8 +8,9 @@ use std::fmt::Write;
 use super::columns::{Cell, Column, Points, Table, Value};
 use super::fault::{Fault, Reason};
 use super::fields::{Field, Kind, LOGS, number_or_absent};
-use super::messages::{LARGEST, Message, Packed, Packet, Watch, go_on, put_bytes, put_number, put_whole};
+use super::messages::{LARGEST, Message, Packed, Packet, put_bytes, put_number, put_whole, report};
 use super::scan::{Act, Kind as Part, Read, Statement, Statements};
+use photocore::Context;
 
 /// Field number of unknown text, outside of the range of files.
 pub(super) const UNKNOWN: u64 = LARGEST + 1;
@@ -22,8 +23,8 @@ const PIXELS: &str = "pixels";
 /// Reads the points of a network in text. Also returns the text without its points, with unchanged line numbers.
 ///
 /// # Errors
-/// An error with its point and line, an interruption by `watch`, or lack of memory.
-pub fn read_text(file: &[u8], watch: Watch<'_>) -> Result<(Points<'static>, String), Fault> {
+/// An error with its point and line, an interruption, or lack of memory.
+pub fn read_text(file: &[u8], context: &mut Context<'_>) -> Result<(Points<'static>, String), Fault> {
     let text = str::from_utf8(file).map_err(|error| {
         let line = file[..error.valid_up_to()].split(|&byte| byte == b'\n').count();
         Reason::Utf8("a line").on_line(line)
@@ -34,7 +35,7 @@ pub fn read_text(file: &[u8], watch: Watch<'_>) -> Result<(Points<'static>, Stri
         let statement = statement?;
         let number = all.points.rows;
         if statement.begins(Part::Object, "ControlPoint") {
-            go_on(watch, number).map_err(|stopped| stopped.on_line(statement.line))?;
+            report(context, number).map_err(|stopped| stopped.on_line(statement.line))?;
             let read = read_point(&mut statements, statement.line, &mut all);
             read.map_err(|fault| fault.in_point(number))?;
             continue;
@@ -240,12 +241,12 @@ const TEXT: &str = "a network in text";
 ///
 /// # Errors
 /// Inconsistent columns, or content that only messages can store.
-pub fn text(all: &Points<'_>, watch: Watch<'_>) -> Result<String, Fault> {
+pub fn text(all: &Points<'_>, context: &mut Context<'_>) -> Result<String, Fault> {
     all.check().map_err(Reason::of_columns)?;
     let mut to = String::new();
     for point in 0..all.points.rows {
         let fault = |reason: Reason| reason.of_columns().in_point(point);
-        go_on(watch, point).map_err(fault)?;
+        report(context, point).map_err(fault)?;
         to.push_str("\n  Object = ControlPoint\n");
         put_items(&items(&all.points, point).map_err(fault)?, 4, &mut to);
         for (index, measure) in all.measures_of(point).enumerate() {

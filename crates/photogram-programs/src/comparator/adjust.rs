@@ -2,15 +2,13 @@
 //!
 //! Observation equations of a calibration.
 
-use std::ops::{ControlFlow, Range};
+use std::ops::Range;
 
 use super::measure::{Basis, Comparator, Placement};
 use super::{Calibration, CalibrationError, Measurement, Solution};
-use photocore::Threads;
-use photocore::adjustment::{
-    self, AdjustError, Adjustment, Evaluated, Event, Model, Problem, leading_matrix,
-};
+use photocore::adjustment::{self, AdjustError, Adjustment, Evaluated, Model, Problem, leading_matrix};
 use photocore::normals::{GroupRows, Layout, Ordering, System};
+use photocore::{Context, Threads};
 
 impl Calibration {
     /// Adjusts all unknowns together by least squares, on a new thread pool.
@@ -18,39 +16,37 @@ impl Calibration {
     /// # Errors
     /// The errors of [`Calibration::adjust_on`], or threads that cannot be started.
     pub fn adjust(&self, options: &adjustment::Options) -> Result<Solution, CalibrationError> {
-        self.adjust_on(options, &Threads::new(options.threads)?, &mut photocore::internal::go_on)
+        self.adjust_on(options, &mut Context::new(&Threads::new(options.threads)?))
     }
 
-    /// Adjusts on the caller's threads. `watch` is called on the calling thread and stops the adjustment by returning `Break`.
+    /// Adjusts on the caller's threads, with progress.
     ///
     /// # Errors
     /// An inconsistent calibration, undetermined unknowns, or an interruption.
     pub fn adjust_on(
         &self,
         options: &adjustment::Options,
-        threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        context: &mut Context<'_>,
     ) -> Result<Solution, CalibrationError> {
         self.check()?;
-        let problem = threads.install(|| self.problem())?;
+        let problem = context.threads.install(|| self.problem())?;
         let cases = self.cases.len();
-        let adjusted =
-            adjustment::adjust(&problem, options, threads, watch).map_err(|error| match error {
-                AdjustError::UndeterminedLocals(points) => CalibrationError::UndeterminedPoints(points),
-                AdjustError::Undetermined(combinations) => CalibrationError::Undetermined(
-                    combinations
-                        .into_iter()
-                        .map(|blocks| {
-                            let (cases, comparator): (Vec<_>, Vec<_>) =
-                                blocks.into_iter().partition(|&block| block < cases);
-                            (cases, !comparator.is_empty())
-                        })
-                        .collect(),
-                ),
-                AdjustError::NotFinite => CalibrationError::NotFinite,
-                AdjustError::Layout(error) => error.into(),
-                AdjustError::Stopped(stopped) => CalibrationError::Stopped(stopped),
-            })?;
+        let adjusted = adjustment::adjust(&problem, options, context).map_err(|error| match error {
+            AdjustError::UndeterminedLocals(points) => CalibrationError::UndeterminedPoints(points),
+            AdjustError::Undetermined(combinations) => CalibrationError::Undetermined(
+                combinations
+                    .into_iter()
+                    .map(|blocks| {
+                        let (cases, comparator): (Vec<_>, Vec<_>) =
+                            blocks.into_iter().partition(|&block| block < cases);
+                        (cases, !comparator.is_empty())
+                    })
+                    .collect(),
+            ),
+            AdjustError::NotFinite => CalibrationError::NotFinite,
+            AdjustError::Layout(error) => error.into(),
+            AdjustError::Stopped(stopped) => CalibrationError::Stopped(stopped),
+        })?;
         Ok(Solution::new(&problem, adjusted))
     }
 

@@ -1,11 +1,8 @@
 //! Search for initial values.
 
-use std::ops::ControlFlow;
-
 use super::model::Model;
 use super::{FirstValues, FirstValuesError, Found, Frame, Missing, RESECTED, Search, Source};
-use photocore::Threads;
-use photocore::adjustment::Event;
+use photocore::Context;
 use photocore::geometry::Pose;
 use photocore::internal::median;
 
@@ -15,17 +12,11 @@ const SIDE: f64 = 0.02;
 const ROUNDS: usize = 6;
 
 impl FirstValues {
-    /// Finds initial values of photos and points.
-    ///
-    /// `watch` is called on the calling thread during adjustments and stops the search by returning `Break`.
+    /// Finds initial values of photos and points, with progress during adjustments.
     ///
     /// # Errors
     /// Invalid indices of observations, an interruption, or lack of memory.
-    pub fn find(
-        &self,
-        threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Found, FirstValuesError> {
+    pub fn find(&self, context: &mut Context<'_>) -> Result<Found, FirstValuesError> {
         let (mut of_photo, mut of_point) = (vec![vec![]; self.photos.len()], vec![vec![]; self.points.len()]);
         for (index, sighting) in self.sightings.iter().enumerate() {
             let (Some(photo), Some(point)) =
@@ -39,7 +30,7 @@ impl FirstValues {
                 point.push(index);
             }
         }
-        Search { given: self, of_photo, of_point, threads, watch }.run()
+        Search { given: self, of_photo, of_point, context: context.reborrow() }.run()
     }
 }
 

@@ -13,13 +13,10 @@ mod find;
 mod model;
 mod resected;
 
-use std::ops::ControlFlow;
-
 use thiserror::Error;
 
-use photocore::adjustment::Event;
 use photocore::geometry::{Matrix3, Pose, Vector3};
-use photocore::{Stopped, Threads};
+use photocore::{Context, Stopped};
 
 /// A-priori data of a photo.
 #[derive(Debug, Clone, Copy, Default)]
@@ -149,11 +146,10 @@ pub enum FirstValuesError {
 /// Minimum number of known points of a resection: three, and one for a check.
 const RESECTED: usize = 4;
 
-/// Input sorted by photo and by point, with the threads and callback of the adjustments.
+/// Input sorted by photo and by point, with the context of the adjustments.
 struct Search<'a> {
     given: &'a FirstValues,
     of_photo: Vec<Vec<usize>>,
     of_point: Vec<Vec<usize>>,
-    threads: &'a Threads,
-    watch: &'a mut dyn FnMut(Event) -> ControlFlow<()>,
+    context: Context<'a>,
 }

@@ -344,7 +344,7 @@ impl Search<'_> {
             hold_unused: true,
             ..Options::default()
         };
-        match network.adjustment(&options).on(self.threads).watched(self.watch).run() {
+        match network.adjustment(&options).run_in(&mut self.context) {
             Ok(solution) => {
                 let finite =
                     solution.photos.iter().all(|photo| photo.pose.iter().all(|value| value.is_finite()));

@@ -1,14 +1,12 @@
 //! Adjustment of a single photo.
 
-use std::ops::ControlFlow;
-
 use super::degenerate::Degeneracy;
 use super::solution::{SinglePhoto, Solution, Solved};
 use super::{ControlPoint, Pose, Resection, ResectionError};
-use photocore::Threads;
-use photocore::adjustment::{self, AdjustError, Event, Options, Problem, Requests};
+use photocore::adjustment::{self, AdjustError, Options, Problem, Requests};
 use photocore::geometry::{ObjectSpace, POSE, rotation, rotation_angles};
 use photocore::normals::{Layout, LayoutError, Ordering, System};
+use photocore::{Context, Threads};
 
 impl Resection {
     /// Adjusts the photo by least squares, on a new thread pool.
@@ -16,21 +14,20 @@ impl Resection {
     /// # Errors
     /// The errors of [`Resection::adjust_on`], or threads that cannot be started.
     pub fn adjust(&self, options: &Options) -> Result<Solution, ResectionError> {
-        self.adjust_on(options, &Threads::new(options.threads)?, &mut photocore::internal::go_on)
+        self.adjust_on(options, &mut Context::new(&Threads::new(options.threads)?))
     }
 
-    /// Adjusts the photo on the caller's threads.
+    /// Adjusts the photo on the caller's threads, with progress.
     ///
     /// Without initial values, every distinct pose of a direct method is adjusted. The solution has the least sum of squares; other poses
     /// that fit about as well are returned as alternatives (see [`Alternative`](super::Alternative)).
     ///
     /// # Errors
-    /// A configuration without a determined pose, or an interruption by `watch`.
+    /// A configuration without a determined pose, or an interruption.
     pub fn adjust_on(
         &self,
         options: &Options,
-        threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        context: &mut Context<'_>,
     ) -> Result<Solution, ResectionError> {
         let starts = match self.start {
             Some(start) => {
@@ -46,9 +43,9 @@ impl Resection {
         let mut failure = ResectionError::NoPlacement;
         let mut undetermined = None;
         for start in starts {
-            let mut adjusted = self.adjust_from(start, options, threads, watch);
+            let mut adjusted = self.adjust_from(start, options, context);
             if let (None, Some(turned)) = (self.start, adjusted.as_ref().ok().and_then(|a| self.upright(a))) {
-                adjusted = self.adjust_from(turned, options, threads, watch);
+                adjusted = self.adjust_from(turned, options, context);
             }
             match adjusted {
                 Ok(adjusted) if self.start.is_none() && !adjusted.behind().is_empty() => {}
@@ -72,13 +69,12 @@ impl Resection {
         &self,
         start: Pose,
         options: &Options,
-        threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+        context: &mut Context<'_>,
     ) -> Result<Solved, ResectionError> {
         let origin = self.origin(&start);
-        let problem = threads.install(|| self.problem(&start, origin))?;
+        let problem = context.threads.install(|| self.problem(&start, origin))?;
         let requests = Requests { history: POSE, ..Requests::default() };
-        let adjusted = adjustment::adjust_with(&problem, options, requests, threads, watch);
+        let adjusted = adjustment::adjust_with(&problem, options, requests, context);
         let adjustment = adjusted.map_err(|error| match error {
             AdjustError::Layout(error) => error.into(),
             AdjustError::Stopped(stopped) => ResectionError::Stopped(stopped),

@@ -1,7 +1,5 @@
 //! Orientation of a model by least squares.
 
-use std::ops::ControlFlow;
-
 use super::error::{Cause, SimilarityError};
 use super::misclosures::Weighted;
 use super::model::{AsControl, CHANGES, SCALE};
@@ -9,40 +7,39 @@ use super::solution::Solution;
 use super::start::Chosen;
 use super::transform::Similarity;
 use super::{Method, Options, Start, Station, determinacy, published, start};
-use photocore::Threads;
-use photocore::adjustment::{self, AdjustError, Event, Problem, Status, Stop};
+use photocore::adjustment::{self, AdjustError, Problem, Status, Stop};
 use photocore::normals::{Layout, Ordering, System};
+use photocore::{Context, Threads};
 
 /// Determines the seven parameters by least squares, on one new thread: control networks are small.
 ///
 /// # Errors
 /// The errors of [`orient_on`], or a thread that cannot be started.
 pub fn orient(stations: &[Station], options: &Options) -> Result<Solution, SimilarityError> {
-    orient_on(stations, options, &Threads::new(1)?, &mut photocore::internal::go_on)
+    orient_on(stations, options, &mut Context::new(&Threads::new(1)?))
 }
 
-/// Determines the parameters on the caller's threads. `watch` is called on the calling thread; `Break` stops the adjustment.
+/// Determines the parameters on the caller's threads, with progress.
 ///
 /// # Errors
 /// Control that does not determine the parameters, unavailable initial values, a mirror image, an interruption.
 pub fn orient_on(
     stations: &[Station],
     options: &Options,
-    threads: &Threads,
-    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    context: &mut Context<'_>,
 ) -> Result<Solution, SimilarityError> {
     let held = options.scale.is_some();
     determinacy::check_counts(stations, held)?;
     // The library's solvers query the number of threads, which would start the global pool outside of `install`.
-    let chosen = threads.install(|| {
+    let chosen = context.threads.install(|| {
         let chosen = start::choose(stations, options.start, options.scale)?;
         determinacy::check_geometry(stations, &chosen.similarity, held).map(|()| chosen)
     })?;
     match options.method {
-        Method::Rigorous => adjust(stations, options, chosen, None, threads, watch),
+        Method::Rigorous => adjust(stations, options, chosen, None, context),
         Method::Report | Method::FillIn => {
             let cycles = published::iterate(stations, options, &chosen.similarity)?;
-            adjust(stations, options, chosen, Some(cycles), threads, watch)
+            adjust(stations, options, chosen, Some(cycles), context)
         }
     }
 }
@@ -62,36 +59,35 @@ fn adjust(
     options: &Options,
     chosen: Chosen,
     cycles: Option<published::Cycles>,
-    threads: &Threads,
-    watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
+    context: &mut Context<'_>,
 ) -> Result<Solution, SimilarityError> {
     let start = cycles.as_ref().map_or(chosen.similarity, |cycles| cycles.similarity);
     if start.scale.is_nan() || start.scale <= 0.0 {
         return Err(SimilarityError::Scale(start.scale));
     }
     let weighted = Weighted::new(stations, &chosen)?;
-    let problem = threads.install(|| problem(&weighted.stations, &start, options.scale.is_some()))?;
+    let problem = context.threads.install(|| problem(&weighted.stations, &start, options.scale.is_some()))?;
     let engine = adjustment::Options {
         method: adjustment::Method::Damped(Stop::Fraction(options.tolerance)),
         max_iterations: if cycles.is_some() { 0 } else { options.max_iterations },
         ..Default::default()
     };
-    let mut adjusted =
-        adjustment::adjust(&problem, &engine, threads, watch).map_err(|error| match error {
-            AdjustError::Layout(error) => error.into(),
-            AdjustError::Stopped(stopped) => SimilarityError::Stopped(stopped),
-            AdjustError::NotFinite => SimilarityError::NotFinite,
-            AdjustError::UndeterminedLocals(stations) => {
-                SimilarityError::Undetermined { cause: Cause::Singular, stations }
-            }
-            AdjustError::Undetermined(_) => {
-                SimilarityError::Undetermined { cause: Cause::Singular, stations: vec![] }
-            }
-        })?;
+    let mut adjusted = adjustment::adjust(&problem, &engine, context).map_err(|error| match error {
+        AdjustError::Layout(error) => error.into(),
+        AdjustError::Stopped(stopped) => SimilarityError::Stopped(stopped),
+        AdjustError::NotFinite => SimilarityError::NotFinite,
+        AdjustError::UndeterminedLocals(stations) => {
+            SimilarityError::Undetermined { cause: Cause::Singular, stations }
+        }
+        AdjustError::Undetermined(_) => {
+            SimilarityError::Undetermined { cause: Cause::Singular, stations: vec![] }
+        }
+    })?;
     if let Some(cycles) = &cycles {
         adjusted.status = if cycles.converged { Status::Converged } else { Status::NotConverged };
     }
-    let solution = threads
+    let solution = context
+        .threads
         .install(|| Solution::new(&weighted, &problem, &adjusted, chosen, cycles, options.scale.is_some()))?;
     let scale = solution.similarity.scale;
     if scale.is_nan() || scale <= 0.0 { Err(SimilarityError::Scale(scale)) } else { Ok(solution) }

@@ -7,7 +7,8 @@ use super::published::{Cycles, Trace};
 use super::start::{Chosen, Started};
 use super::transform::{Matrix7, Similarity};
 use super::{Station, determinacy, misclosures};
-use photocore::adjustment::{Adjustment, Iteration, Problem, Status, leading_matrix};
+use photocore::Iteration;
+use photocore::adjustment::{Adjustment, Problem, Status, leading_matrix};
 use photocore::geometry::{Matrix3, Vector3};
 
 /// Station after the orientation. Unknown values are NaN.

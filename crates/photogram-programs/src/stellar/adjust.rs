@@ -1,12 +1,10 @@
 //! Adjustment of a stellar calibration.
 
-use std::ops::ControlFlow;
-
 use super::model::{Partials, Rows, StarImages};
 use super::{COMMON, Calibration, INTERIOR, Options, Solution, Star, StellarError, Weights};
-use photocore::Threads;
-use photocore::adjustment::{self, AdjustError, Event, Linearized, Phase, Problem};
+use photocore::adjustment::{self, AdjustError, Linearized, Problem};
 use photocore::normals::{Layout, LayoutError, Ordering, System};
+use photocore::{Context, Threads};
 
 impl Calibration {
     /// Adjusts by least squares with exact partials, on a new thread pool.
@@ -14,32 +12,23 @@ impl Calibration {
     /// # Errors
     /// The errors of [`Calibration::adjust_on`], or threads that cannot be started.
     pub fn adjust(&self, options: &Options) -> Result<Solution, StellarError> {
-        self.adjust_on(options, &Threads::new(options.adjustment.threads)?, &mut photocore::internal::go_on)
+        self.adjust_on(options, &mut Context::new(&Threads::new(options.adjustment.threads)?))
     }
 
-    /// Adjusts on the caller's threads.
-    ///
-    /// `watch` is called on the calling thread and stops the adjustment by returning `Break`.
+    /// Adjusts on the caller's threads, with progress.
     ///
     /// # Errors
     /// An inconsistent calibration, undetermined unknowns, or an interruption.
-    pub fn adjust_on(
-        &self,
-        options: &Options,
-        threads: &Threads,
-        watch: &mut dyn FnMut(Event) -> ControlFlow<()>,
-    ) -> Result<Solution, StellarError> {
-        let problem = threads.install(|| self.problem(options.unit, Partials::Exact))?;
-        let adjusted = adjustment::adjust(&problem, &options.adjustment, threads, watch)
-            .map_err(|error| self.named(&problem, error, threads))?;
+    pub fn adjust_on(&self, options: &Options, context: &mut Context<'_>) -> Result<Solution, StellarError> {
+        let problem = context.threads.install(|| self.problem(options.unit, Partials::Exact))?;
+        let adjusted = adjustment::adjust(&problem, &options.adjustment, context)
+            .map_err(|error| self.named(&problem, error, context.threads))?;
         let mut whole = None;
         if options.whole && adjusted.cofactors.is_some() {
-            let total = problem.layout().locals();
-            let mut between = |done| watch(Event::Progress { phase: Phase::Invert, done, total });
             let values = adjusted.unknowns.clone();
-            let normal = Linearized::form(&problem, None, values, vec![], threads, &mut between);
-            let normal = normal.map_err(|error| self.named(&problem, error, threads))?;
-            whole = self.of_parameters(&normal, &problem, threads)?;
+            let normal = Linearized::form(&problem, None, values, vec![], context);
+            let normal = normal.map_err(|error| self.named(&problem, error, context.threads))?;
+            whole = self.of_parameters(&normal, &problem, context.threads)?;
         }
         Solution::new(self, options, &problem, adjusted, whole)
     }
@@ -63,8 +52,9 @@ impl Calibration {
         threads: &Threads,
     ) -> Result<Linearized, StellarError> {
         let failed = |error| self.named(problem, error, threads);
-        let normal = Linearized::form(problem, None, problem.initial.clone(), held, threads, &mut go_on)
-            .map_err(failed)?;
+        let normal =
+            Linearized::form(problem, None, problem.initial.clone(), held, &mut Context::new(threads))
+                .map_err(failed)?;
         if normal.sum_of_squares.is_finite() { Ok(normal) } else { Err(failed(AdjustError::NotFinite)) }
     }
 
@@ -84,7 +74,7 @@ impl Calibration {
             // The reported parameters are undetermined at the initial values.
             AdjustError::Undetermined(_) => {
                 let initial = problem.initial.clone();
-                let normal = Linearized::form(problem, None, initial, vec![], threads, &mut go_on);
+                let normal = Linearized::form(problem, None, initial, vec![], &mut Context::new(threads));
                 let found = normal.map_or(vec![], |normal| normal.undetermined_unknowns());
                 let named = found.into_iter().map(|unknowns| parameters_of(problem, unknowns));
                 StellarError::Undetermined(named.collect())
@@ -182,7 +172,7 @@ impl Calibration {
         let Some(log_determinant) = normal.factor.log_determinant() else { return Ok(None) };
         let parameters: Vec<usize> =
             (problem.layout().all_locals().end..problem.layout().unknowns()).collect();
-        let cofactors = normal.joint(problem, &parameters, None, threads, &mut go_on);
+        let cofactors = normal.joint(problem, &parameters, None, &mut Context::new(threads));
         let cofactors = cofactors.map_err(|error| self.named(problem, error, threads))?;
         Ok(cofactors.map(|cofactors| (log_determinant, cofactors)))
     }
@@ -202,8 +192,4 @@ impl Calibration {
 pub(super) fn parameters_of(problem: &Problem<StarImages<'_>>, unknowns: Vec<usize>) -> Vec<usize> {
     let first = problem.layout().all_locals().end;
     unknowns.into_iter().map(|unknown| unknown - first).collect()
-}
-
-fn go_on(_: usize) -> ControlFlow<()> {
-    ControlFlow::Continue(())
 }

@@ -48,15 +48,15 @@ impl BlockNetwork {
         let workers = Workers::of(threads, self.network.images.len());
         let inner = datum.map(datum_of).transpose()?;
         let start = start.map(|start| start.state.clone());
-        let told = watched(py, workers, progress, |pool, watch| {
-            let adjustment = self.network.adjustment(&self.options).on(pool).watched(watch);
+        let told = watched(py, workers, progress, |context| {
+            let adjustment = self.network.adjustment(&self.options);
             let adjustment = match (&inner, &start, &keep) {
                 (Some(NetworkDatum::Inner(inner)), ..) => adjustment.in_datum(inner),
                 (_, Some(start), _) => adjustment.from_state(start),
                 (_, _, Some(points)) => adjustment.kept(points),
                 _ => adjustment,
             };
-            adjustment.run().map(|solution| self.told(solution, pool))
+            adjustment.run_in(context).map(|solution| self.told(solution, context.threads))
         })?;
         BlockSolution::new(py, told.map_err(|error| refused(&error))?)
     }
@@ -72,9 +72,9 @@ impl BlockNetwork {
     ) -> PyResult<Py<BlockSolution>> {
         let workers = Workers::of(threads, self.network.images.len());
         let datum = datum_of(datum)?;
-        let told = watched(py, workers, progress, |pool, watch| {
-            let solution = self.network.in_datum(&self.options, &state.state, &datum, pool, watch);
-            solution.map(|solution| self.told(solution, pool))
+        let told = watched(py, workers, progress, |context| {
+            let solution = self.network.in_datum(&self.options, &state.state, &datum, context);
+            solution.map(|solution| self.told(solution, context.threads))
         })?;
         BlockSolution::new(py, told.map_err(|error| refused(&error))?)
     }
@@ -109,16 +109,17 @@ impl BlockNetwork {
         threads: usize,
     ) -> PyResult<Vec<(&'static str, f64)>> {
         let workers = Workers::of(threads, self.network.images.len());
-        let found =
-            watched(py, workers, None, |pool, _| self.network.resistance(&self.options, &state.state, pool))?;
+        let found = watched(py, workers, None, |context| {
+            self.network.resistance(&self.options, &state.state, context.threads)
+        })?;
         found.map_err(|error| refused(&error))
     }
 
     #[pyo3(signature = (*, threads))]
     fn held_for_datum(&self, py: Python<'_>, threads: usize) -> PyResult<Vec<(usize, usize)>> {
         let workers = Workers::of(threads, self.network.images.len());
-        let held = watched(py, workers, None, |pool, _| {
-            photogram_parts::held_for_datum(&self.network, &self.options, pool)
+        let held = watched(py, workers, None, |context| {
+            photogram_parts::held_for_datum(&self.network, &self.options, context.threads)
         })?;
         held.map_err(|error| refused(&error))
     }
@@ -138,9 +139,9 @@ impl BlockNetwork {
         let names: Vec<UnknownName> = indices("names", &names)?.as_chunks().0.to_vec();
         let values = numbers("values", &values)?;
         let workers = Workers::of(threads, self.network.images.len());
-        let found = watched(py, workers, None, |pool, _| {
+        let found = watched(py, workers, None, |context| {
             let adjusted = AdjustedInParts { middle, held: &held, names: &names, values: &values };
-            photogram_parts::parts_in_datum(&self.network, &self.options, &inner, adjusted, pool)
+            photogram_parts::parts_in_datum(&self.network, &self.options, &inner, adjusted, context.threads)
         })?;
         let (moved, DatumColumns { b, t, condition, exact }) = found.map_err(|error| refused(&error))?;
         let [moved, b, t] = [moved, b, t].map(|column| PyArray1::from_vec(py, column));

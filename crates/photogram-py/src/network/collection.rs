@@ -39,13 +39,13 @@ impl CollectionNetwork {
     ) -> PyResult<Py<CollectionSolution>> {
         let workers = Workers::of(threads, self.network.images.len());
         let start = start.map(|start| start.state.clone());
-        let told = watched(py, workers, progress, |pool, watch| {
-            let adjustment = self.network.adjustment(&self.options).on(pool).watched(watch);
+        let told = watched(py, workers, progress, |context| {
+            let adjustment = self.network.adjustment(&self.options);
             let adjustment = match &start {
                 None => adjustment,
                 Some(start) => adjustment.from_state(start),
             };
-            adjustment.run().map(|solution| Told::new(solution, pool))
+            adjustment.run_in(context).map(|solution| Told::new(solution, context.threads))
         })?;
         CollectionSolution::new(py, told.map_err(|error| refused(&error))?, self.unknowns)
     }

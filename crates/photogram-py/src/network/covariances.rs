@@ -48,8 +48,8 @@ pub fn factored(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<BlockCovariances> {
     let images = network.images.len();
-    let found = watched(py, Workers::of(threads, images), progress, |pool, watch| {
-        network.covariances(options, &state.state, None, pool, watch)
+    let found = watched(py, Workers::of(threads, images), progress, |context| {
+        network.covariances(options, &state.state, None, context)
     })?;
     found
         .map(|covariances| BlockCovariances { covariances, images, refused })
@@ -76,8 +76,8 @@ impl BlockCovariances {
         let count = partials.as_array().nrows();
         let partials: Vec<f64> = partials.as_array().iter().copied().collect();
         let of = of_rows(of)?;
-        let found = watched(py, Workers::of(0, self.images), None, |pool, _| {
-            self.covariances.influences(&partials, &of, pool)
+        let found = watched(py, Workers::of(0, self.images), None, |context| {
+            self.covariances.influences(&partials, &of, context.threads)
         })?;
         let influences = found.map_err(|error| (self.refused)(&error))?;
         let rows = influences.len() / count.max(1);
@@ -94,8 +94,8 @@ impl BlockCovariances {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Matrix<'py>> {
         let (rows, columns) = (of_rows(rows)?, columns.map(of_rows).transpose()?);
-        let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
-            self.covariances.cofactors(&rows, columns.as_deref(), pool, watch)
+        let found = watched(py, Workers::of(threads, self.images), progress, |context| {
+            self.covariances.cofactors(&rows, columns.as_deref(), context)
         })?;
         matrix(py, found.map_err(|error| (self.refused)(&error))?, columns.is_none())
     }
@@ -111,8 +111,8 @@ impl BlockCovariances {
     ) -> PyResult<Matrix<'py>> {
         let of = of_rows(of)?;
         let partials: Vec<f64> = partials.as_array().iter().copied().collect();
-        let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
-            self.covariances.propagate(&partials, &of, pool, watch)
+        let found = watched(py, Workers::of(threads, self.images), progress, |context| {
+            self.covariances.propagate(&partials, &of, context)
         })?;
         matrix(py, found.map_err(|error| (self.refused)(&error))?, true)
     }
@@ -132,10 +132,10 @@ impl BlockCovariances {
         let groups = groups_of(groups)?;
         let probing = Probing { exact, vectors, seed };
         let workers = Workers::of(threads, self.images);
-        let found = watched(py, workers, progress, |pool, watch| match classes {
-            None => self.covariances.group_squares(&groups, &probing, pool, watch),
+        let found = watched(py, workers, progress, |context| match classes {
+            None => self.covariances.group_squares(&groups, &probing, context),
             Some(classes) => {
-                let squares = self.covariances.own_squares(&groups, classes, &probing, pool, watch)?;
+                let squares = self.covariances.own_squares(&groups, classes, &probing, context)?;
                 Ok(GroupSquares { equations: vec![], squares, exact: vec![] })
             }
         })?;
@@ -153,8 +153,8 @@ impl BlockCovariances {
     ) -> PyResult<Blocks<'py>> {
         let count = columns.as_array().shape().first().copied().unwrap_or(0);
         let columns: Vec<f64> = columns.as_array().iter().copied().collect();
-        let found = watched(py, Workers::of(threads, self.images), progress, |pool, watch| {
-            self.covariances.project_images(&columns, pool, watch)
+        let found = watched(py, Workers::of(threads, self.images), progress, |context| {
+            self.covariances.project_images(&columns, context)
         })?;
         let found = found.map_err(|error| (self.refused)(&error))?;
         PyArray1::from_vec(py, found).reshape([count, self.images, 2])

@@ -86,7 +86,7 @@ pub fn find_first_values<'py>(
         sightings: (0..seen.len()).map(sighting).collect(),
     };
     let workers = Workers::of(threads, given.sightings.len());
-    match watched(py, workers, None, |pool, watch| given.find(pool, watch))? {
+    match watched(py, workers, None, |context| given.find(context))? {
         Ok(found) => row(py, found),
         Err(error @ FirstValuesError::Index(_)) => Err(InputError::new_err(error.to_string())),
         Err(error) => Err(PyValueError::new_err(error.to_string())),

@@ -4,8 +4,7 @@ use std::borrow::Cow;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
-use photocore::Threads;
-use photocore::adjustment::Watch;
+use photocore::Context;
 use photocore::network::{BlockOf, Network, NetworkError as Failure, Options, Surroundings};
 use photocore::normals::Contribution;
 use photogram_parts::{DatumOfPart, FormedNode as Formed, Node as Core};
@@ -125,7 +124,8 @@ impl Node {
     #[pyo3(signature = (state, *, threads))]
     fn relocate<'py>(&self, py: Python<'py>, state: Array<'py>, threads: usize) -> PyResult<Vector<'py>> {
         let state = numbers("state", &state)?;
-        let moved = watched(py, self.workers(threads), None, |pool, _| self.node.relocate(&state, pool))?;
+        let moved =
+            watched(py, self.workers(threads), None, |context| self.node.relocate(&state, context.threads))?;
         moved.map(|moved| PyArray1::from_vec(py, moved)).map_err(|error| failed(&error))
     }
 
@@ -137,7 +137,8 @@ impl Node {
         threads: usize,
     ) -> PyResult<(f64, f64, f64, f64, f64)> {
         let state = numbers("state", &state)?;
-        let found = watched(py, self.workers(threads), None, |pool, _| self.node.objective(&state, pool))?;
+        let found =
+            watched(py, self.workers(threads), None, |context| self.node.objective(&state, context.threads))?;
         let (sums, minimised) = found.map_err(|error| failed(&error))?;
         Ok((sums.camera, sums.ground, sums.plates, sums.observations, minimised))
     }
@@ -161,8 +162,8 @@ impl Node {
                 diagonal: Cow::Borrowed(slice("the diagonal of a contribution", diagonal)?),
             });
         }
-        let formed = watched(py, self.workers(threads), None, |pool, watch| {
-            let mut formed = self.node.form(&state, &given, (damping, curved), pool, watch)?;
+        let formed = watched(py, self.workers(threads), None, |context| {
+            let mut formed = self.node.form(&state, &given, (damping, curved), context)?;
             let contribution = formed.take_contribution();
             Ok((formed, contribution))
         })?;
@@ -187,9 +188,9 @@ impl Node {
         threads: usize,
     ) -> PyResult<Py<BlockSolution>> {
         let (state, before) = (numbers("state", &state)?, numbers("before", &before)?);
-        let told = watched(py, self.workers(threads), None, |pool, _| {
-            let solution = self.node.solution(&state, &before, pool)?;
-            Ok(Told::without_records(solution, self.records, pool))
+        let told = watched(py, self.workers(threads), None, |context| {
+            let solution = self.node.solution(&state, &before, context.threads)?;
+            Ok(Told::without_records(solution, self.records, context.threads))
         })?;
         BlockSolution::new(py, told.map_err(|error: Failure| failed(&error))?)
     }
@@ -209,7 +210,8 @@ impl Node {
         let below = children.into_iter().map(blocks).collect::<PyResult<_>>()?;
         let surroundings = Surroundings { outer: blocks(outer)?, below, middle, held };
         let workers = Workers::of(threads, network.images.len());
-        let node = watched(py, workers, None, |pool, _| Core::new(network, options, surroundings, pool))?;
+        let node =
+            watched(py, workers, None, |context| Core::new(network, options, surroundings, context.threads))?;
         node.map(|node| Self { node: Arc::new(node), records }).map_err(|error| failed(&error))
     }
 
@@ -245,11 +247,11 @@ impl FormedNode {
         &self,
         py: Python<'_>,
         threads: usize,
-        ask: impl FnOnce(&mut Formed, &Threads, Watch<'_>) -> Result<T, Failure> + Send,
+        ask: impl FnOnce(&mut Formed, &mut Context<'_>) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
         let workers = Workers::of(threads, self.node.images());
-        let found = watched(py, workers, None, |pool, watch| match &mut *lock(&self.formed) {
-            Some(formed) => ask(formed, pool, watch).map(Some),
+        let found = watched(py, workers, None, |context| match &mut *lock(&self.formed) {
+            Some(formed) => ask(formed, context).map(Some),
             None => Ok(None),
         })?;
         found.map_err(|error| failed(&error))?.ok_or_else(|| used_up("the factor"))
@@ -284,8 +286,7 @@ impl FormedNode {
     #[pyo3(signature = (outer, *, threads))]
     fn solve<'py>(&self, py: Python<'py>, outer: Array<'py>, threads: usize) -> PyResult<Vector<'py>> {
         let outer = numbers("outer", &outer)?;
-        let step =
-            self.asked(py, threads, |formed, pool, watch| self.node.solve(formed, &outer, pool, watch))?;
+        let step = self.asked(py, threads, |formed, context| self.node.solve(formed, &outer, context))?;
         Ok(PyArray1::from_vec(py, step))
     }
 
@@ -305,9 +306,8 @@ impl FormedNode {
         let state = numbers("state", &state)?;
         let left =
             left.iter().map(|left| slice("what a child has left", left)).collect::<PyResult<Vec<_>>>()?;
-        let found = self.asked(py, threads, |formed, pool, watch| {
-            self.node.reduce_chord(formed, &state, &left, pool, watch)
-        })?;
+        let found = self
+            .asked(py, threads, |formed, context| self.node.reduce_chord(formed, &state, &left, context))?;
         Ok(found.map(|(left, decrease)| (PyArray1::from_vec(py, left), decrease)))
     }
 
@@ -319,16 +319,16 @@ impl FormedNode {
         threads: usize,
     ) -> PyResult<(Vector<'py>, Vector<'py>)> {
         let rights = slice("rights", &rights)?.to_vec();
-        let (left, products) = self
-            .asked(py, threads, |formed, pool, watch| self.node.reduce_rights(formed, rights, pool, watch))?;
+        let (left, products) =
+            self.asked(py, threads, |formed, context| self.node.reduce_rights(formed, rights, context))?;
         Ok((PyArray1::from_vec(py, left), PyArray1::from_vec(py, products)))
     }
 
     #[pyo3(signature = (outer, *, threads))]
     fn complete<'py>(&self, py: Python<'py>, outer: Array<'py>, threads: usize) -> PyResult<Vector<'py>> {
         let outer = slice("outer", &outer)?;
-        let found = self
-            .asked(py, threads, |formed, pool, watch| self.node.solve_reduced(formed, outer, pool, watch))?;
+        let found =
+            self.asked(py, threads, |formed, context| self.node.solve_reduced(formed, outer, context))?;
         Ok(PyArray1::from_vec(py, found))
     }
 
@@ -355,9 +355,11 @@ impl FormedNode {
         };
         let formed = lock(&self.formed).take().ok_or_else(|| used_up("the factor"))?;
         let workers = Workers::of(threads, self.node.images());
-        let found = watched(py, workers, None, |pool, watch| {
-            let found = self.node.invert(formed, given, &state, datum, pool, watch);
-            found.map(|(solution, below)| (Told::without_records(solution, self.records, pool), below))
+        let found = watched(py, workers, None, |context| {
+            let found = self.node.invert(formed, given, &state, datum, context);
+            found.map(|(solution, below)| {
+                (Told::without_records(solution, self.records, context.threads), below)
+            })
         })?;
         let (told, below) = found.map_err(|error| failed(&error))?;
         let below = below.into_iter().map(|triangle| PyArray1::from_vec(py, triangle)).collect();

@@ -111,7 +111,8 @@ impl NetworkTrial {
         work: impl FnOnce(&Trial, &Threads) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
         let workers = Workers::of(self.threads, self.images);
-        watched(py, workers, None, |pool, _| work(&self.trial, pool))?.map_err(|error| (self.refused)(&error))
+        watched(py, workers, None, |context| work(&self.trial, context.threads))?
+            .map_err(|error| (self.refused)(&error))
     }
 
     /// Runs work on the trial without the GIL.
@@ -122,8 +123,9 @@ impl NetworkTrial {
         work: impl FnOnce(&mut Session<'_>) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
         let (workers, trial) = (Workers::of(self.threads, self.images), &mut self.trial);
-        let found =
-            watched(py, workers, progress, |threads, watch| work(&mut Session { trial, threads, watch }))?;
+        let found = watched(py, workers, progress, |context| {
+            work(&mut Session { trial, context: context.reborrow() })
+        })?;
         found.map_err(|error| (self.refused)(&error))
     }
 }
@@ -149,8 +151,8 @@ pub fn tried(
         return Ok(NetworkTrial { trial, images, photos, threads, refused });
     }
     let state = state.map(|state| state.state.clone());
-    let found = watched(py, Workers::of(threads, images), None, |pool, _| {
-        network.trial(options, state.as_ref(), pool)
+    let found = watched(py, Workers::of(threads, images), None, |context| {
+        network.trial(options, state.as_ref(), context.threads)
     })?;
     found
         .map(|trial| NetworkTrial { trial, images, photos, threads, refused })
@@ -177,7 +179,7 @@ impl NetworkTrial {
     }
 
     fn stand(&mut self, py: Python<'_>) -> PyResult<OutcomeRow> {
-        self.run(py, None, |own| own.trial.stand(own.threads, own.watch)).map(outcome_row)
+        self.run(py, None, |own| own.trial.stand(&mut own.context)).map(outcome_row)
     }
 
     #[pyo3(signature = (rows, points, photos, *, tolerance, progress))]
@@ -195,8 +197,7 @@ impl NetworkTrial {
             points: points.into_iter().collect(),
             photos: photos.into_iter().collect(),
         };
-        let adjusted =
-            self.run(py, progress, |own| own.trial.adjust(&out, tolerance, own.threads, own.watch))?;
+        let adjusted = self.run(py, progress, |own| own.trial.adjust(&out, tolerance, &mut own.context))?;
         Ok(outcome_row(adjusted))
     }
 

@@ -5,8 +5,8 @@ use super::super::predictions::ResidualBlock;
 use super::super::trial::{Excluded, Trial};
 use super::super::{Combination, NetworkError, Outcome};
 use super::log::Standing;
-use crate::Threads;
-use crate::adjustment::{Loss, Watch};
+use crate::Context;
+use crate::adjustment::Loss;
 
 /// Scales of Huber's and Cauchy's loss, in standard deviations of an image point.
 const HUBER: f64 = 1.50;
@@ -42,16 +42,14 @@ pub trait Tried {
 pub struct Session<'a> {
     /// The trial.
     pub trial: &'a mut Trial,
-    /// Threads of its adjustments and tests.
-    pub threads: &'a Threads,
-    /// Progress of its adjustments.
-    pub watch: Watch<'a>,
+    /// Threads and progress of its adjustments and tests.
+    pub context: Context<'a>,
 }
 
 impl Tried for Session<'_> {
     fn adjust(&mut self, out: &Excluded, tolerance: f64) -> Result<Standing, NetworkError> {
         let Outcome { status, sum_of_squares, degrees_of_freedom, collapsed, .. } =
-            self.trial.adjust(out, Some(tolerance), self.threads, self.watch)?;
+            self.trial.adjust(out, Some(tolerance), &mut self.context)?;
         if collapsed.is_empty() {
             return Ok(Standing { status, sum_of_squares, degrees_of_freedom });
         }
@@ -59,29 +57,29 @@ impl Tried for Session<'_> {
     }
 
     fn tests(&mut self) -> Result<Tests, NetworkError> {
-        self.trial.tests(true, self.threads)
+        self.trial.tests(true, self.context.threads)
     }
 
     fn predictions(&mut self, groups: &[usize]) -> Result<Tests, NetworkError> {
-        self.trial.predictions(groups, self.threads)
+        self.trial.predictions(groups, self.context.threads)
     }
 
     fn on_points(&mut self, points: &[usize], gone: bool) -> Result<Vec<ResidualBlock>, NetworkError> {
-        self.trial.on_points(points, (0.0, gone), self.threads)
+        self.trial.on_points(points, (0.0, gone), self.context.threads)
     }
 
     fn responses(&mut self) -> Result<Vec<f64>, NetworkError> {
         let all: Vec<usize> = (0..self.trial.groups.len()).collect();
-        self.trial.responses(&all, self.threads)
+        self.trial.responses(&all, self.context.threads)
     }
 
     fn resist(&mut self, scale: f64) -> Result<Option<Vec<f64>>, NetworkError> {
         let huber = Loss::Huber(HUBER * scale);
-        if self.trial.resist(huber, ROBUST_ITERATIONS, self.threads, self.watch)?.is_none() {
+        if self.trial.resist(huber, ROBUST_ITERATIONS, &mut self.context)?.is_none() {
             return Ok(None);
         }
         let limit = CAUCHY * scale;
-        let weights = self.trial.resist(Loss::Cauchy(limit), ROBUST_ITERATIONS, self.threads, self.watch)?;
+        let weights = self.trial.resist(Loss::Cauchy(limit), ROBUST_ITERATIONS, &mut self.context)?;
         // The weight of Cauchy's loss is 1 / (1 + (size / limit)^2).
         let size = |weight: f64| limit * (weight.max(LEAST_WEIGHT).recip() - 1.0).max(0.0).sqrt();
         Ok(weights.map(|weights| weights.into_iter().map(size).collect()))

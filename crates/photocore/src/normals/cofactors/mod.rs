@@ -11,8 +11,8 @@ use super::incidence::Batches;
 use super::layout::Layout;
 use super::system::System;
 use super::vectorised::dot;
-use super::watch::Control;
 use super::workspace::zeros;
+use crate::context::Control;
 use crate::parallel;
 
 pub(super) use others::AtNode;
