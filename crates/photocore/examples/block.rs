@@ -60,7 +60,7 @@ fn block() -> Network {
         mounts: vec![],
         trajectories: vec![],
         image_times: vec![],
-        passages: vec![],
+        image_corrections: vec![],
     }
 }
 

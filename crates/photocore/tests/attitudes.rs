@@ -92,11 +92,11 @@ proptest! {
         let (rho, shift, point) = (Vector3::from(rho), Vector3::from(shift), Vector3::from(point));
         let pose = Pose { position: Vector3::new(0.3, -0.2, 5.0), attitude };
         let stepped = pose.step(&shift, &rho);
-        let u = pose.sight(&point);
+        let u = pose.to_camera_frame(&point);
         let expected = u.cross(&rho) - attitude.tr_mul(&shift);
-        prop_assert!((stepped.sight(&point) - u - expected).amax() < 1e-12);
+        prop_assert!((stepped.to_camera_frame(&point) - u - expected).amax() < 1e-12);
         prop_assert!((stepped.attitude.tr_mul(&stepped.attitude) - Matrix3::identity()).amax() < 1e-15);
-        prop_assert!((stepped.depth(&point) + stepped.sight(&point).z).abs() < 1e-15);
+        prop_assert!((stepped.depth(&point) + stepped.to_camera_frame(&point).z).abs() < 1e-15);
     }
 
     #[test]
@@ -116,12 +116,12 @@ proptest! {
         ] {
             let place = |values: &[f64; 6]| Orientation::new(numbers, ObjectSpace::Rectangular, values);
             let placed = place(&values);
-            let (partials, _) = placed.chain(&placed.sight(&point), &g, &point);
+            let (partials, _) = placed.chain(&placed.to_camera_frame(&point), &g, &point);
             for k in 0..6 {
                 let ends = [1e-5, -1e-5].map(|step| {
                     let mut moved = values;
                     moved[k] += step;
-                    place(&moved).sight(&point).dot(&g)
+                    place(&moved).to_camera_frame(&point).dot(&g)
                 });
                 let expected = (ends[0] - ends[1]) / 2e-5;
                 prop_assert!((partials[k] - expected).abs() < 1e-8, "{numbers:?} {k}: {} {expected}", partials[k]);
@@ -163,11 +163,11 @@ proptest! {
             let photo = Orientation::stepping(space, position, &local);
             let at = photo.centre() + Vector3::new(3.0, -5.0, 4.0);
             let point = Point::new(ObjectSpace::Rectangular, at.into());
-            let (partials, _) = photo.chain(&photo.sight(&point), &g, &point);
+            let (partials, _) = photo.chain(&photo.to_camera_frame(&point), &g, &point);
             for k in 0..3 {
                 let ends = [1e-5, -1e-5].map(|step| {
                     let turned = local * angle_axis_rotation(&Vector3::ith(k, step));
-                    Orientation::stepping(space, position, &turned).sight(&point).dot(&g)
+                    Orientation::stepping(space, position, &turned).to_camera_frame(&point).dot(&g)
                 });
                 let expected = (ends[0] - ends[1]) / 2e-5;
                 // Geocentric coordinates are accurate to a nanometre.
@@ -176,7 +176,7 @@ proptest! {
             }
             // In angles K relates the two.
             let rates = numbers.rates(angles);
-            let (by_angles, _) = Orientation::from_angles(space, sense, position, angles).chain(&photo.sight(&point), &g, &point);
+            let (by_angles, _) = Orientation::from_angles(space, sense, position, angles).chain(&photo.to_camera_frame(&point), &g, &point);
             let expected = rates.tr_mul(&Vector3::new(partials[3], partials[4], partials[5]));
             prop_assert!((0..3).all(|k| by_angles[k] == partials[k] && (by_angles[3 + k] - expected[k]).abs() < 1e-13));
         }
@@ -222,8 +222,8 @@ fn attitudes_agree_with_the_golden_data() {
             let values: [f64; 3] = list(&golden["values"]).try_into().unwrap();
             let singular = golden["singular"].as_bool().unwrap();
             let near = if singular { 1e-8 } else { 1e-14 };
-            let apart = (numbers.attitude(values) - attitude).amax();
-            assert!(apart < near, "{case} {name}: matrix {apart:e}");
+            let difference = (numbers.attitude(values) - attitude).amax();
+            assert!(difference < near, "{case} {name}: matrix {difference:e}");
             let found = numbers.numbers(&attitude);
             assert_eq!(numbers.is_singular(found), singular, "{case} {name}");
             let near = if [11, 19].contains(&case) { 1e-8 } else { 1e-13 };
@@ -233,9 +233,9 @@ fn attitudes_agree_with_the_golden_data() {
                 && Vector3::from(values).norm() > PI - 1e-6
                 && Vector3::from(found).dot(&Vector3::from(values)) < 0.0;
             for k in 0..3 {
-                let apart = found[k] - values[k];
-                let apart = if vector { apart.abs() } else { (0.5 * apart).sin().abs() };
-                assert!(flipped || apart < near, "{case} {name} {k}: {found:?} {values:?}");
+                let difference = found[k] - values[k];
+                let difference = if vector { difference.abs() } else { (0.5 * difference).sin().abs() };
+                assert!(flipped || difference < near, "{case} {name} {k}: {found:?} {values:?}");
             }
             match numbers.cofactors(values, &of_step) {
                 None => assert!(singular, "{case} {name}"),

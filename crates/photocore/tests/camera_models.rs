@@ -51,8 +51,8 @@ fn backward_cameras_correct_as_the_golden_data() {
             let measured: [f64; 2] = list(&point["measured"]).try_into().unwrap();
             let (corrected, what) = (list(&point["corrected"]), format!("{name} {measured:?}"));
             let found = camera.correction(measured).unwrap();
-            let apart = [0, 1].map(|k| (found[k] - corrected[k]).abs());
-            assert!(apart[0].max(apart[1]) < 1e-12 * 20.0, "{what}: {found:?} {corrected:?}");
+            let difference = [0, 1].map(|k| (found[k] - corrected[k]).abs());
+            assert!(difference[0].max(difference[1]) < 1e-12 * 20.0, "{what}: {found:?} {corrected:?}");
             let (residual, image) = camera.compare(&u, measured);
             let by_parameters = rows(&point["d_corrected_d_params"]);
             for row in 0..2 {

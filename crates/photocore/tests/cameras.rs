@@ -67,10 +67,10 @@ proptest! {
 
     #[test]
     fn every_camera_sees_directions_and_has_the_partials_of_its_image(
-        sight in (prop::array::uniform2(-0.6..0.6f64), -8.0..-1.0f64),
+        to_camera_frame in (prop::array::uniform2(-0.6..0.6f64), -8.0..-1.0f64),
         numbers in prop::array::uniform5(-1.0..1.0f64),
     ) {
-        let ([x, y], z) = sight;
+        let ([x, y], z) = to_camera_frame;
         let u = Vector3::new(-z * x, -z * y, z);
         for name in Camera::NAMES {
             let camera = sample(name, &numbers);
@@ -90,13 +90,13 @@ proptest! {
                 for (k, partial) in found[..found.len() - camera.constants()].iter().enumerate() {
                     let size = size_of(&camera, k);
                     let (expected, near) = partial_of(name, &values, k, size, row);
-                    let apart = (size * (partial - expected)).abs();
-                    prop_assert!(apart < near * scale, "{name} {k}: {partial} {expected}");
+                    let difference = (size * (partial - expected)).abs();
+                    prop_assert!(difference < near * scale, "{name} {k}: {partial} {expected}");
                 }
             }
             let direction = camera.direction(image.xy);
             let back = direction.map(|direction| (direction - u.normalize()).amax());
-            prop_assert!(back.is_some_and(|apart| apart < 1e-12), "{camera:?}: {direction:?}");
+            prop_assert!(back.is_some_and(|difference| difference < 1e-12), "{camera:?}: {direction:?}");
             prop_assert_eq!(camera.with_parameters(&camera.parameters()), Some(camera.clone()));
             prop_assert_eq!(camera.name(), *name);
         }

@@ -154,7 +154,7 @@ fn collection(photos: usize, points: usize, coarseness: f64) -> Network {
         mounts: vec![],
         trajectories: vec![],
         image_times: vec![],
-        passages: vec![],
+        image_corrections: vec![],
     }
 }
 

@@ -91,7 +91,7 @@ fn design(network: &Network, solution: &Solution) -> Mat<f64> {
         let attitude = NUMBERS.attitude([omega, phi, kappa]);
         let orientation = Orientation::stepping(network.space, [x, y, z], &attitude);
         let point = At::new(network.space, solution.points[image.point].unwrap().coordinates);
-        let u = orientation.sight(&point);
+        let u = orientation.to_camera_frame(&point);
         let gradients = CAMERA.linearize(&u).by_u;
         for (row, gradient) in gradients.iter().enumerate() {
             let (by_photo, by_point) = orientation.chain(&u, gradient, &point);
@@ -119,7 +119,7 @@ fn dense(a: &Mat<f64>, carriers: &[usize]) -> Mat<f64> {
 }
 
 /// Returns the largest difference of the cofactors of points and positions from dense ones, relative to the largest of the block.
-fn apart(solution: &Solution, q: &Mat<f64>) -> f64 {
+fn difference(solution: &Solution, q: &Mat<f64>) -> f64 {
     let block = |first: usize, found: &dyn Fn(usize, usize) -> f64| {
         let largest = (0..3).map(|k| q[(first + k, first + k)]).fold(0.0, f64::max);
         let each = (0..9).map(|at| (found(at / 3, at % 3) - q[(first + at / 3, first + at % 3)]).abs());
@@ -187,8 +187,8 @@ fn inner_constraints_are_those_of_the_pseudo_inverse() {
             .flat_map(|first| first..first + 3)
             .collect();
         let a = design(&network, &found);
-        let apart = apart(&found, &dense(&a, &carriers));
-        assert!(apart < 1e-9, "{apart:e}");
+        let difference = difference(&found, &dense(&a, &carriers));
+        assert!(difference < 1e-9, "{difference:e}");
 
         // The differences of the carriers from their initial positions have a zero component along every datum motion.
         let places =
@@ -259,8 +259,8 @@ fn cofactors_of_everything_go_over_to_any_datum() {
     let carriers: Vec<usize> =
         (0..3 * POINTS).chain(photos.iter().map(step).flat_map(|first| first..first + 3)).collect();
     let expected = dense(&design(&network, &found), &carriers);
-    let apart = greatest(&whole(&network, &found, None), &expected);
-    assert!(apart < 1e-8, "{apart:e}");
+    let difference = greatest(&whole(&network, &found, None), &expected);
+    assert!(difference < 1e-8, "{difference:e}");
 
     // Without another adjustment, from the minimal datum and from a third one.
     let (options, threads) = (options(FINE), threads());

@@ -29,7 +29,7 @@ fn network(poses: &[Pose], places: &[Vector3], errors: f64) -> Network {
     let (mut photos, mut images) = (vec![], vec![]);
     for (photo, pose) in poses.iter().enumerate() {
         for (point, place) in places.iter().enumerate() {
-            let u = pose.sight(place);
+            let u = pose.to_camera_frame(place);
             let n = 2 * images.len();
             let xy = [0, 1].map(|k| CAMERA.principal_distance * u[k] / u[2] + errors * SD * noise(n + k));
             images.push(Image { photo, point, xy, sd: [SD; 2] });
@@ -164,8 +164,8 @@ fn common_unknowns_move_with_a_free_network() {
             assert!((a.change[i] - b.change[i]).abs() < 1e-6 * sd(i), "{k}: {:?} {:?}", a.change, b.change);
             for j in 0..a.change.len() {
                 let at = i * a.change.len() + j;
-                let apart = (a.cofactors[at] - b.cofactors[at]).abs() / sd(i) / sd(j);
-                assert!(apart < 1e-7, "{k} {i} {j}: {apart:e}");
+                let difference = (a.cofactors[at] - b.cofactors[at]).abs() / sd(i) / sd(j);
+                assert!(difference < 1e-7, "{k} {i} {j}: {difference:e}");
             }
         }
     }

@@ -110,8 +110,8 @@ fn assert_cofactors(own: &[f64], golden: &Value, what: &str) {
     for (i, row) in golden.iter().enumerate() {
         for (j, expected) in row.iter().enumerate() {
             let scale = (golden[i][i] * golden[j][j]).sqrt();
-            let apart = (own[i * width + j] - expected).abs();
-            assert!(apart <= 1e-8 * scale, "{what} {i} {j}: {} {expected}", own[i * width + j]);
+            let difference = (own[i * width + j] - expected).abs();
+            assert!(difference <= 1e-8 * scale, "{what} {i} {j}: {} {expected}", own[i * width + j]);
         }
     }
 }
@@ -214,9 +214,9 @@ fn a_block_that_calibrates_its_camera_with_priors() {
     }
     let residuals = rows(&golden["kinds"]["image"]["residuals"]);
     for (own, expected) in solution.images.iter().zip(residuals) {
-        let apart = (0..2).map(|k| (own.unwrap().residual[k] - expected[k]).abs());
+        let difference = (0..2).map(|k| (own.unwrap().residual[k] - expected[k]).abs());
         // A millionth of the standard deviation of an observation.
-        assert!(apart.fold(0.0, f64::max) < 1e-9);
+        assert!(difference.fold(0.0, f64::max) < 1e-9);
     }
     let sum = |kind: &str| golden["kinds"][kind]["sum_of_squares"].as_f64().unwrap();
     let sums = solution.sums_of_squares;

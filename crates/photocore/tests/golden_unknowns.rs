@@ -151,8 +151,8 @@ fn assert_position(found: &[f64], block: &Value, what: &str) {
 }
 
 fn assert_attitude(found: &Matrix3, expected: &Value, what: &str) {
-    let apart = (found - matrix(expected)).amax();
-    assert!(apart < 1e-11, "{what}: {apart:e}");
+    let difference = (found - matrix(expected)).amax();
+    assert!(difference < 1e-11, "{what}: {difference:e}");
 }
 
 /// Compares unknowns, cofactors, and global statistics.

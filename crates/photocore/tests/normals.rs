@@ -118,7 +118,7 @@ impl Dense {
         let right = (0..equations).map(|_| number()).collect();
         let mut weight: Vec<f64> = (0..layout.unknowns()).map(|_| 0.5 + 0.4 * number()).collect();
         let mut prior_right: Vec<f64> = weight.iter().map(|w| w * number()).collect();
-        let held = (0..layout.locals()).filter(|&local| layout.stands_apart(local));
+        let held = (0..layout.locals()).filter(|&local| layout.has_uncoupled_groups(local));
         for unknown in held.flat_map(|local| layout.local_range(local)) {
             (weight[unknown], prior_right[unknown]) = (1.0, 0.0);
             (0..equations).for_each(|row| matrix[(row, unknown)] = 0.0);
@@ -356,7 +356,7 @@ fn compare_equation_blocks(dense: &Dense, system: &System, selected: &SelectedIn
         assert_eq!(found.rows(), count);
         let group = |row: usize| row / layout.rows();
         for (k, value) in found.equations.iter().enumerate() {
-            if layout.stands_apart(local) && group(k / count) != group(k % count) {
+            if layout.has_uncoupled_groups(local) && group(k / count) != group(k % count) {
                 assert!(value.is_nan(), "no pattern has it");
                 continue;
             }
@@ -458,7 +458,7 @@ fn compare_blocks(layout: &Layout, selected: &SelectedInverse, inverse: &Mat<f64
             }
         }
     }
-    for local in (0..layout.locals()).filter(|&local| !layout.stands_apart(local)) {
+    for local in (0..layout.locals()).filter(|&local| !layout.has_uncoupled_groups(local)) {
         let blocks: BTreeSet<usize> =
             layout.groups_of(local).flat_map(|group| layout.blocks_of(group)).collect();
         for (&one, &other) in blocks.iter().flat_map(|one| blocks.iter().map(move |other| (one, other))) {

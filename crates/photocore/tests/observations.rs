@@ -105,7 +105,7 @@ fn images_alone() -> Network {
         mounts: vec![],
         trajectories: vec![],
         image_times: vec![],
-        passages: vec![],
+        image_corrections: vec![],
     }
 }
 
@@ -256,7 +256,7 @@ fn seen(photo: usize) -> Pose {
 
 /// Returns the error-free image of a point.
 fn imaged(photo: usize, point: usize) -> [f64; 2] {
-    let u = seen(photo).sight(&place(point).into());
+    let u = seen(photo).to_camera_frame(&place(point).into());
     [0, 1].map(|k| PRINCIPAL_DISTANCE * u[k] / u[2])
 }
 
@@ -349,7 +349,8 @@ fn of_commons() -> Vec<Observation> {
         |point: usize| -> Observation { OnLine { point, line: LINE, precision: sd(&[1e-3, 2e-3]) }.into() };
     let relative = |i: usize, j: usize| -> Observation {
         let (a, b) = (seen(i), seen(j));
-        let pose = Pose { position: a.sight(&b.position), attitude: a.attitude.transpose() * b.attitude };
+        let pose =
+            Pose { position: a.to_camera_frame(&b.position), attitude: a.attitude.transpose() * b.attitude };
         Relative { photos: [i, j], pose, precision: covariance(&[0.01, 0.02, 0.01, 1e-3, 2e-3, 1e-3]) }.into()
     };
     let base = |length: f64| -> Observation { Base { first: None, second: SENSOR, length, sd: 2e-3 }.into() };

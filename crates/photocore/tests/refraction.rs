@@ -210,10 +210,10 @@ proptest! {
         let photo = View::new(space, case.sense, case.position, case.attitude, case.c);
         let point = Point::new(space, case.point);
         let (station, foot) = (refraction.vertical(space, case.position), refraction.vertical(space, case.point));
-        let lift = refraction.lift(&photo.orientation, &station, &point, &foot);
-        let lifted = View { orientation: photo.orientation.under(&lift), camera: photo.camera };
-        let projection = lifted.linearize(&point.lifted(&lift));
-        prop_assert_eq!(photo.project(&point.lifted(&lift)), projection.xy);
+        let lift = refraction.offset(&photo.orientation, &station, &point, &foot);
+        let with_offset = View { orientation: photo.orientation.with_offset(&lift), camera: photo.camera };
+        let projection = with_offset.linearize(&point.with_offset(&lift));
+        prop_assert_eq!(photo.project(&point.with_offset(&lift)), projection.xy);
 
         let to_ground = case.sense == RotationSense::PhotoToGround;
         let unknowns = std::array::from_fn(|k| [case.position, case.attitude, case.point][k / 3][k % 3]);
@@ -262,7 +262,7 @@ fn lift_of(refraction: &Refraction, station: [f64; 3], point: [f64; 3]) -> [f64;
     let space = ObjectSpace::Rectangular;
     let photo = View::new(space, RotationSense::GroundToPhoto, station, [0.0; 3], -152.74);
     let at = |coordinates| refraction.vertical(space, coordinates);
-    refraction.lift(&photo.orientation, &at(station), &Point::new(space, point), &at(point)).vector.into()
+    refraction.offset(&photo.orientation, &at(station), &Point::new(space, point), &at(point)).vector.into()
 }
 
 fn air_only(model: AirModel) -> Refraction {

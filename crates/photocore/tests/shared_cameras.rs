@@ -154,7 +154,7 @@ fn network() -> Network {
         mounts: vec![],
         trajectories: vec![],
         image_times: vec![],
-        passages: vec![],
+        image_corrections: vec![],
     }
 }
 
@@ -552,9 +552,9 @@ fn parameters_may_be_observed_with_their_covariance() {
             assert!((own.redundancy[k] - other.redundancy[k]).abs() < 1e-8);
             assert!((own.information[k] - other.information[k]).abs() <= 1e-8 * own.information[k]);
         }
-        let apart = own.cofactors.iter().zip(&other.cofactors).map(|(a, b)| (a - b).abs());
+        let difference = own.cofactors.iter().zip(&other.cofactors).map(|(a, b)| (a - b).abs());
         assert!(
-            apart.fold(0.0, f64::max)
+            difference.fold(0.0, f64::max)
                 <= 1e-9 * own.cofactors.iter().fold(0.0, |most: f64, q| most.max(q.abs()))
         );
     }

@@ -19,7 +19,7 @@ impl Model for Bent {
         Box::new(At { bends: &self.0, values: unknowns[1..].to_vec() })
     }
 
-    fn steps_swing(&self) -> bool {
+    fn may_oscillate(&self) -> bool {
         true
     }
 }

@@ -72,8 +72,8 @@ fn images_and_partials_are_those_of_mrcal() {
             let u = Vector3::new(ray[0], -ray[1], -ray[2]);
             let image = camera.linearize(&u);
             let expected = list(&entry["images"][k]);
-            let apart = (0..2).map(|row| (image.xy[row] - expected[row]).abs()).fold(0.0, f64::max);
-            assert!(apart < near, "{model} {ray:?}: {:?} {expected:?}", image.xy);
+            let difference = (0..2).map(|row| (image.xy[row] - expected[row]).abs()).fold(0.0, f64::max);
+            assert!(difference < near, "{model} {ray:?}: {:?} {expected:?}", image.xy);
             assert_eq!(camera.image(&u), image.xy);
             for row in 0..2 {
                 let by = image.by_u[row];
@@ -97,11 +97,11 @@ fn written_out(order: i32, size: [usize; 2], fov: f64, v: &[C]) -> [C; 2] {
     let mut at = place;
     for row in 0..size[1] {
         for column in 0..size[0] {
-            let apart = [0, 1].map(|k| {
+            let difference = [0, 1].map(|k| {
                 let knot = [column, row][k] as f64 - (size[k] as f64 - 1.0) / 2.0;
                 place[k] * s - knot
             });
-            let weight = bump(order, apart[0]) * bump(order, apart[1]);
+            let weight = bump(order, difference[0]) * bump(order, difference[1]);
             let knot = 7 + 2 * (row * size[0] + column);
             (0..2).for_each(|k| at[k] += weight * v[knot + k]);
         }
@@ -151,8 +151,8 @@ proptest! {
                 prop_assert!((found - expected).abs() < 1e-10 * 700.0, "{k} {row}: {found} {expected}");
             }
         }
-        let apart = camera.direction(image.xy).map(|direction| (direction - u.normalize()).amax());
-        prop_assert!(apart.is_some_and(|apart| apart < 1e-13), "{apart:?}");
+        let difference = camera.direction(image.xy).map(|direction| (direction - u.normalize()).amax());
+        prop_assert!(difference.is_some_and(|difference| difference < 1e-13), "{difference:?}");
         prop_assert!(camera.faces(&u) && camera.faces(&-u));
     }
 }

@@ -218,8 +218,8 @@ fn inner_constraints_over_everything_are_the_pseudo_inverse() {
     moved.take_to(&problem, &bare, &datum, &problem.initial, &mut Context::new(&threads)).unwrap();
     assert!(moved.cofactors.is_none() && moved.redundancy.is_none());
     assert_eq!(moved.effort.formations, formations);
-    let apart = moved.unknowns.iter().zip(&free.unknowns).map(|(x, other)| (x - other).abs());
-    assert!(apart.fold(0.0, f64::max) < 1e-9);
+    let difference = moved.unknowns.iter().zip(&free.unknowns).map(|(x, other)| (x - other).abs());
+    assert!(difference.fold(0.0, f64::max) < 1e-9);
 }
 
 #[test]
@@ -281,8 +281,8 @@ fn what_is_open_is_found_by_trying_and_held() {
         // A fixed point leaves the rotation; a point observed in x leaves the shift along y and the rotation.
         let (turning, _) = adjusted(&|problem| problem.sd[24..26].fill(0.0), method);
         assert_eq!(turning.datum, [16]);
-        let (loose, _) = adjusted(&|problem| problem.sd[24] = 0.5, method);
-        assert_eq!(loose.datum, [16, 17]);
+        let (undetermined_photos, _) = adjusted(&|problem| problem.sd[24] = 0.5, method);
+        assert_eq!(undetermined_photos.datum, [16, 17]);
         // Two points define the datum.
         let (mut placed, problem) = adjusted(&|problem| problem.sd[24..28].fill(0.5), method);
         assert!(placed.datum.is_empty());

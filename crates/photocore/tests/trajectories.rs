@@ -70,7 +70,7 @@ fn image(photo: usize, point: usize) -> [f64; 2] {
             position: position + t * Vector3::from(v),
             attitude: attitude * angle_axis_rotation(&(t * Vector3::from(w))),
         };
-        let u = at.sight(&place(point));
+        let u = at.to_camera_frame(&place(point));
         xy = [0, 1].map(|k| CAMERA.principal_distance * u[k] / u[2]);
     }
     xy
@@ -141,7 +141,7 @@ fn network(seed: u64) -> Network {
         mounts: (0..PHOTOS).map(moves).collect(),
         trajectories: (0..PHOTOS).map(trajectory).collect(),
         image_times: times,
-        passages: vec![],
+        image_corrections: vec![],
     }
 }
 
@@ -207,7 +207,7 @@ fn photos_at_rest_are_photos() {
         mounts: vec![],
         trajectories: vec![],
         image_times: vec![],
-        passages: vec![],
+        image_corrections: vec![],
         commons: vec![],
         ..resting.clone()
     };

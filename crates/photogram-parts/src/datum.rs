@@ -7,7 +7,7 @@ use faer::Mat;
 use photocore::Threads;
 use photocore::adjustment::Adjusted;
 use photocore::internal::{Assembled, Selected, Transformation, moved};
-use photocore::network::{InnerConstraints, Network, NetworkError, Options, Surroundings};
+use photocore::network::{InnerConstraints, Interface, Network, NetworkError, Options};
 
 /// Owner of a parameter (0: photo, 1: shared camera, 2: shared parameter, 3: point), its index in the network, and the number of the
 /// parameter there.
@@ -16,7 +16,7 @@ pub type UnknownName = [usize; 3];
 /// Results of a network that was adjusted in parts.
 #[derive(Debug, Clone, Copy)]
 pub struct AdjustedInParts<'a> {
-    /// Centre that was passed to all nodes ([`Surroundings::middle`]).
+    /// Centre that was passed to all nodes ([`Interface::middle`]).
     pub middle: Option<[f64; 3]>,
     /// Photos with the numbers of their fixed parameters.
     pub held: &'a [(usize, usize)],
@@ -89,12 +89,12 @@ fn select_whole(
 ) -> Result<Selected, NetworkError> {
     network.check()?;
     let left_out = network.left_out(network.untouched_photos(), None)?;
-    let surroundings = Surroundings { middle, ..Surroundings::default() };
-    Ok(threads.install(|| network.select(&left_out, surroundings)))
+    let interface = Interface { middle, ..Interface::default() };
+    Ok(threads.install(|| network.select(&left_out, interface)))
 }
 
 /// Returns the parameters that an adjustment of the whole network fixes as its datum: photo and number of the pose parameter (see
-/// [`Surroundings::held`]). The list is empty if the network defines a datum.
+/// [`Interface::held`]). The list is empty if the network defines a datum.
 ///
 /// # Errors
 /// Errors of [`Network::adjust`] before its first iteration.

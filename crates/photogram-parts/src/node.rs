@@ -11,7 +11,7 @@
 use photocore::adjustment::{AdjustError, Adjustment, AnyProblem, Counts, Linearized};
 use photocore::internal::{Assembled, ObservationEquations, Reweighting};
 use photocore::network::{
-    Dropped, Image, Network, NetworkError, Options, Point, Solution, SumsByType, Surroundings,
+    Dropped, Image, Interface, Network, NetworkError, Options, Point, Solution, SumsByType,
 };
 use photocore::normals::{
     Contribution, Equations, FactorOptions, InvertOptions, Operations, ReducedRights, SolveOptions, packed,
@@ -62,17 +62,17 @@ impl Node {
     pub fn new(
         network: &Network,
         options: &Options,
-        surroundings: Surroundings,
+        interface: Interface,
         threads: &Threads,
     ) -> Result<Self, NetworkError> {
         network.check()?;
-        check_blocks(network, &surroundings)?;
-        let surroundings = with_coefficients(network, surroundings);
+        check_blocks(network, &interface)?;
+        let interface = with_coefficients(network, interface);
         let mut network = network.clone();
-        release(&mut network, &surroundings);
-        let in_photos = surroundings.held.clone();
+        release(&mut network, &interface);
+        let in_photos = interface.held.clone();
         let none = network.left_out(vec![false; network.photos.len()], None)?;
-        let selected = threads.install(|| network.select(&none, surroundings));
+        let selected = threads.install(|| network.select(&none, interface));
         let assembled = threads.install(|| network.assemble(options, selected, None))?;
         assembled.check_memory(options, threads)?;
         let layout = assembled.problem().layout();
@@ -338,8 +338,8 @@ impl Node {
     }
 
     /// Returns true if the last steps may converge slowly, so that a chord step pays.
-    pub fn ends_slowly(&self) -> bool {
-        self.problem().model.ends_slowly()
+    pub fn converges_linearly(&self) -> bool {
+        self.problem().model.converges_linearly()
     }
 
     /// Reduces the right-hand side of a chord step, a second step with the existing factors, at a state with the contributions

@@ -40,7 +40,7 @@ fn given(seed: u32, photos: usize, control: usize, wrong: f64) -> (FirstValues, 
     let mut sightings = vec![];
     for (photo, pose) in poses.iter().enumerate() {
         for (point, at) in points.iter().enumerate() {
-            let seen = pose.sight(at).normalize() + 5e-5 * random.vector();
+            let seen = pose.to_camera_frame(at).normalize() + 5e-5 * random.vector();
             let other = Vector3::new(0.4 * random.next(), 0.4 * random.next(), -1.0);
             let bad = 0.5 * (random.next() + 1.0) < wrong;
             let direction = if bad { other } else { seen }.normalize();

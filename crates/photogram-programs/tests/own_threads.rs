@@ -64,7 +64,7 @@ fn block(strips: usize, points: usize) -> Network {
         mounts: vec![],
         trajectories: vec![],
         image_times: vec![],
-        passages: vec![],
+        image_corrections: vec![],
     }
 }
 

@@ -25,7 +25,7 @@ fn second(random: &mut Random) -> Pose {
 }
 
 fn rays(points: &[Vector3], second: &Pose) -> Vec<[Vector3; 2]> {
-    points.iter().map(|point| [point.normalize(), second.sight(point).normalize()]).collect()
+    points.iter().map(|point| [point.normalize(), second.to_camera_frame(point).normalize()]).collect()
 }
 
 fn relief(random: &mut Random, count: usize) -> Vec<Vector3> {

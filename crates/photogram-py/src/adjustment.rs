@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use photocore::Iteration;
-use photocore::adjustment::{Adjustment, History, Loss, Seconds, Status};
+use photocore::adjustment::{Adjustment, History, Loss, PhaseTimes, Status};
 use photocore::normals::Ordering;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -64,7 +64,7 @@ pub fn operations<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bou
 
 /// Returns the seconds spent in each phase.
 pub fn seconds<'py>(py: Python<'py>, adjustment: &Adjustment) -> PyResult<Bound<'py, PyDict>> {
-    let Seconds { form, factor, solve, invert, cofactors } = adjustment.effort.seconds;
+    let PhaseTimes { form, factor, solve, invert, cofactors } = adjustment.effort.seconds;
     let phases =
         [("form", form), ("factor", factor), ("solve", solve), ("invert", invert), ("cofactors", cofactors)];
     phases.into_py_dict(py)

@@ -8,8 +8,8 @@ use nalgebra::DMatrix;
 use numpy::{PyArray1, PyArrayMethods, PyUntypedArrayMethods};
 use photocore::geometry::angle_axis::rotation_angle_axis;
 use photocore::geometry::{
-    self, AirModel, Ellipsoid, GeometryError, Lift, ObjectSpace, Point, Refraction, RotationSense, Vector3,
-    View, Water, WaterModel,
+    self, AirModel, Ellipsoid, GeometryError, ObjectSpace, Point, Refraction, RefractionOffset,
+    RotationSense, Vector3, View, Water, WaterModel,
 };
 use photogram_programs::features::{Form, Measured, distance, measure};
 use photogram_programs::nearest::nearest;
@@ -107,8 +107,8 @@ pub fn project<'py>(
         match &refraction {
             None => photo.project(&point),
             Some(refraction) => {
-                let lift = lift(refraction, space, (&photo, positions[i]), (&point, points[i]));
-                photo.project(&point.lifted(&lift))
+                let offset = offset(refraction, space, (&photo, positions[i]), (&point, points[i]));
+                photo.project(&point.with_offset(&offset))
             }
         }
     };
@@ -133,20 +133,20 @@ pub fn refraction_shift<'py>(
         // The result is independent of the attitude.
         let photo = View::new(space, RotationSense::GroundToPhoto, positions[i], [0.0; 3], -1.0);
         let point = Point::new(space, points[i]);
-        lift(&refraction, space, (&photo, positions[i]), (&point, points[i])).vector.into()
+        offset(&refraction, space, (&photo, positions[i]), (&point, points[i])).vector.into()
     };
     table(py, py.detach(|| (0..points.len()).map(shift).collect()))
 }
 
 /// Returns the lift of one point for one photo, each with its coordinates.
-fn lift(
+fn offset(
     refraction: &Refraction,
     space: ObjectSpace,
     (photo, position): (&View, [f64; 3]),
     (point, coordinates): (&Point, [f64; 3]),
-) -> Lift {
+) -> RefractionOffset {
     let at = |coordinates| refraction.vertical(space, coordinates);
-    refraction.lift(&photo.orientation, &at(position), point, &at(coordinates))
+    refraction.offset(&photo.orientation, &at(position), point, &at(coordinates))
 }
 
 /// Model of the air, model of the water, its level (linear unit), its refractive index, metres per linear unit.

@@ -14,7 +14,7 @@ use std::ptr;
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicPtr, AtomicUsize, Ordering::SeqCst};
 
-use photocore::normals::take_product_buffers;
+use photocore::normals::preallocate_product_buffers;
 use pyo3::import_exception;
 use pyo3::prelude::*;
 
@@ -172,7 +172,7 @@ pub fn take_buffers() -> bool {
     }
     // If memory is insufficient for both, the room is released for the buffers.
     ROOM.set(Some(Room(pointer, layout)));
-    take_product_buffers();
+    preallocate_product_buffers();
     if let Some(room) = ROOM.take() {
         room.give_back();
     }

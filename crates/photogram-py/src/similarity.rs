@@ -156,7 +156,7 @@ pub struct SimilaritySolution {
 }
 
 fn told(py: Python<'_>, found: Solution) -> PyResult<SimilaritySolution> {
-    let of_stations = |part: fn(&AdjustedStation) -> [f64; 3]| {
+    let parameter_unknowns = |part: fn(&AdjustedStation) -> [f64; 3]| {
         table(py, found.stations.iter().map(part).collect()).map(Bound::unbind)
     };
     let cofactors = found.stations.iter().map(|station| row_major(&station.cofactors));
@@ -175,12 +175,12 @@ fn told(py: Python<'_>, found: Solution) -> PyResult<SimilaritySolution> {
         tangent_cofactors: table(py, found.tangent_cofactors.to_vec())?.unbind(),
         condition: found.condition,
         sum_of_squares: found.sum_of_squares,
-        misclosures: of_stations(|station| station.misclosure.into())?,
-        model_residuals: of_stations(|station| station.model_residual.into())?,
-        adjusted_control: of_stations(|station| station.control.into())?,
+        misclosures: parameter_unknowns(|station| station.misclosure.into())?,
+        model_residuals: parameter_unknowns(|station| station.model_residual.into())?,
+        adjusted_control: parameter_unknowns(|station| station.control.into())?,
         control_cofactors: blocks(py, cofactors.collect())?.unbind(),
-        redundancy: of_stations(|station| station.redundancy)?,
-        standardized: of_stations(|station| station.standardized)?,
+        redundancy: parameter_unknowns(|station| station.redundancy)?,
+        standardized: parameter_unknowns(|station| station.standardized)?,
         weakness: found.weakness.map(|(cause, stations)| (cause.name(), stations)),
         cycles: found.cycles,
     })

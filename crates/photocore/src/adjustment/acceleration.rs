@@ -22,13 +22,13 @@ use std::time::Instant;
 
 use nalgebra::DMatrix;
 
+use super::anderson::AndersonHistory;
 use super::control::{BENDS, Control, ROUNDING};
 use super::equations::ObservationEquations;
 use super::options::{History, NEGLIGIBLE, Stop};
 use super::problem::Evaluated;
 use super::result::AdjustError;
 use super::run::{Iterate, Run};
-use super::secants::Secants;
 use super::statistics::weighted;
 use crate::Iteration;
 use crate::normals::{Chord, SolveOptions, dot};
@@ -71,7 +71,7 @@ pub(super) struct Accelerated<'s, 'a> {
     /// and the model there with its objective, if evaluated.
     pub evaluated: Option<(Box<dyn Evaluated + 'a>, f64)>,
     /// Whether the step makes too many groups leave the layout.
-    pub outgrown: bool,
+    pub pattern_violations: bool,
     /// Ratio of the second-order term to the step, if computed.
     pub bend: Option<f64>,
 }
@@ -96,15 +96,15 @@ impl<'a> Run<'a, '_> {
             None => (Cow::Borrowed(step), iteration),
         };
         let ahead = self.problem.advanced(state.values(), &step);
-        let outgrown = self.is_outgrown(&iteration, followed, &ahead);
-        let values = if followed && !outgrown {
+        let pattern_violations = self.leaves_pattern(&iteration, followed, &ahead);
+        let values = if followed && !pattern_violations {
             let found = self.followed(state, ahead.clone(), (control.best, control.stop))?;
             self.chord = found.as_ref().map(|&(_, length)| length);
             found.map_or(ahead, |(values, _)| values)
         } else {
             self.stepped(state, ahead, &iteration)?
         };
-        Ok(Accelerated { step, iteration, values, evaluated: None, outgrown, bend: None })
+        Ok(Accelerated { step, iteration, values, evaluated: None, pattern_violations, bend: None })
     }
 
     /// Adds the second-order term to a damped step in a curved valley; returns the plain step if that gains more.
@@ -127,7 +127,7 @@ impl<'a> Run<'a, '_> {
         }
         let bend = Some(square.max(0.0).sqrt() / iteration.largest_change);
         let (step, evaluated) = (Cow::Borrowed(step), Some(evaluated));
-        Ok(Accelerated { step, iteration, values, evaluated, outgrown: false, bend })
+        Ok(Accelerated { step, iteration, values, evaluated, pattern_violations: false, bend })
     }
 
     /// Follows a failed full step along a valley: a fraction of the step, then steps back to the floor with a damping that preserves the
@@ -199,28 +199,29 @@ impl<'a> Run<'a, '_> {
         iteration: &Iteration,
         followed: bool,
     ) -> Option<(Vec<f64>, Iteration)> {
-        let last = self.secants.last.take();
-        if iteration.damping > 0.0 || self.options.loss.is_some() || !self.problem.model.steps_swing() {
-            self.secants.pairs.clear();
+        let last = self.anderson.last.take();
+        if iteration.damping > 0.0 || self.options.loss.is_some() || !self.problem.model.may_oscillate() {
+            self.anderson.pairs.clear();
             return None;
         }
         if let Some((given, before)) = last
             && !followed
-            && (self.secants.correct() || self.is_slow(iteration))
+            && (self.anderson.correct() || self.is_slow(iteration))
         {
-            let taken = self.problem.model.step_between(&before, state.reached());
+            let entries = self.problem.model.step_between(&before, state.reached());
             let difference = step.iter().zip(&given).map(|(now, before)| now - before).collect();
-            self.secants.keep(taken, difference, MOST_DIFFERENCES);
+            self.anderson.keep(entries, difference, MOST_DIFFERENCES);
         } else {
-            self.secants.pairs.clear();
+            self.anderson.pairs.clear();
         }
-        let learnt = if self.secants.correct() { self.learnt(state, step, iteration) } else { None };
+        let anderson_step =
+            if self.anderson.correct() { self.anderson_step(state, step, iteration) } else { None };
         if iteration.largest_change <= NEGLIGIBLE {
-            return learnt;
+            return anderson_step;
         }
         let (best, plain) = (iteration.sum_of_squares, self.reached(state, step));
         let lowest = best.min(plain);
-        match learnt.filter(|(own, _)| self.reached(state, own) <= lowest) {
+        match anderson_step.filter(|(own, _)| self.reached(state, own) <= lowest) {
             None if plain.is_nan() || plain > best => self.shortened(state, step, iteration, plain),
             found => found,
         }
@@ -237,16 +238,16 @@ impl<'a> Run<'a, '_> {
     }
 
     /// Returns the step after Anderson acceleration.
-    fn learnt(
+    fn anderson_step(
         &self,
         state: &Iterate<'a>,
         step: &[f64],
         iteration: &Iteration,
     ) -> Option<(Vec<f64>, Iteration)> {
-        let all = self.secants.all(step);
+        let all = self.anderson.all(step);
         let products = state.equations.products(self.context.threads, &all);
-        let shares = self.secants.shares(&products)?;
-        let own = self.secants.corrected(step, &shares);
+        let shares = self.anderson.shares(&products)?;
+        let own = self.anderson.corrected(step, &shares);
         let largest_change = (&products * &shares).dot(&shares).max(0.0).sqrt();
         Some((own, Iteration { largest_change, ..*iteration }))
     }
@@ -303,7 +304,7 @@ impl<'a> Run<'a, '_> {
     fn is_for_chord(&self, step: &Iteration) -> bool {
         step.damping == 0.0
             && self.options.loss.is_none()
-            && self.problem.model.ends_slowly()
+            && self.problem.model.converges_linearly()
             && self.history().is_for_chord(step.largest_change)
     }
 
@@ -318,7 +319,7 @@ impl<'a> Run<'a, '_> {
         step.damping == 0.0
             && step.largest_change < CLOSE
             && self.options.loss.is_none()
-            && self.problem.model.steps_swing()
+            && self.problem.model.may_oscillate()
             && state.linearized.factor.has_cached()
     }
 
@@ -331,7 +332,7 @@ impl<'a> Run<'a, '_> {
         (best, stop): (f64, Stop),
     ) -> Result<Option<(Vec<f64>, f64)>, AdjustError> {
         let start = Instant::now();
-        let (mut secants, mut differences) = (Secants::default(), Vec::<Vec<f64>>::new());
+        let (mut anderson, mut differences) = (AndersonHistory::default(), Vec::<Vec<f64>>::new());
         let mut here = self.link(state, values)?;
         if here.is_higher_than(best) {
             return Ok(None);
@@ -339,8 +340,8 @@ impl<'a> Run<'a, '_> {
         let (mut end, mut lowest) = ((here.values.clone(), here.change()), here.sum_of_squares);
         let mut lengths = vec![here.change()];
         while lengths.len() < MOST_CHORDS && falls(&lengths) && !is_enough(stop, &here) {
-            let taken = here.corrected(&secants, &differences);
-            let next = self.link(state, self.problem.advanced(&here.values, &taken))?;
+            let entries = here.corrected(&anderson, &differences);
+            let next = self.link(state, self.problem.advanced(&here.values, &entries))?;
             // An accelerated chord may temporarily raise the sum of squares, by no more than the last predicted decrease.
             if next.is_higher_than(lowest + here.chord.decrease) {
                 break;
@@ -348,7 +349,7 @@ impl<'a> Run<'a, '_> {
             if !next.is_higher_than(lowest) {
                 (end, lowest) = ((next.values.clone(), next.change()), lowest.min(next.sum_of_squares));
             }
-            secants.keep(taken, minus(&next.chord.step, &here.chord.step), MOST_CHORDS);
+            anderson.keep(entries, minus(&next.chord.step, &here.chord.step), MOST_CHORDS);
             differences.push(minus(&next.chord.reduced, &here.chord.reduced));
             lengths.push(next.change());
             here = next;
@@ -391,14 +392,14 @@ impl Link {
     }
 
     /// Returns the chord after Anderson acceleration with the stored steps and differences of y.
-    fn corrected(&self, secants: &Secants, differences: &[Vec<f64>]) -> Vec<f64> {
-        if !secants.correct() {
+    fn corrected(&self, anderson: &AndersonHistory, differences: &[Vec<f64>]) -> Vec<f64> {
+        if !anderson.correct() {
             return self.chord.step.clone();
         }
         let row = |k: usize| if k == 0 { &self.chord.reduced } else { &differences[k - 1] };
         let count = differences.len() + 1;
-        let shares = secants.shares(&DMatrix::from_fn(count, count, |i, j| dot(row(i), row(j))));
-        shares.map_or_else(|| self.chord.step.clone(), |shares| secants.corrected(&self.chord.step, &shares))
+        let shares = anderson.shares(&DMatrix::from_fn(count, count, |i, j| dot(row(i), row(j))));
+        shares.map_or_else(|| self.chord.step.clone(), |shares| anderson.corrected(&self.chord.step, &shares))
     }
 
     /// Whether the sum of squares exceeds a limit, apart from rounding errors and negligible chords, or is not finite.

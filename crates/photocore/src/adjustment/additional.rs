@@ -11,7 +11,7 @@ use nalgebra::{DMatrix, DVector};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::equations::{EquationOf, ObservationEquations, Row};
-use super::group_test::Few;
+use super::group_test::SmallVector;
 use super::linearized::Linearized;
 use super::problem::AnyProblem;
 use super::walk::Buffers;
@@ -31,7 +31,7 @@ pub struct Equation<'a> {
 impl Equation<'_> {
     /// Unknowns, fixed ones among them, with their coefficients.
     pub fn coefficients(&self) -> impl Iterator<Item = (usize, f64)> {
-        self.row.taken()
+        self.row.entries()
     }
 }
 
@@ -135,7 +135,7 @@ impl LocalRows {
         partials.extend(scratch.iter().filter(|partial| is_tie || partial.1 != 0.0));
         let start = own.len();
         own.resize(start + *width, 0.0);
-        row.taken().filter(|own| !to.fixed[own.0]).for_each(|(unknown, value)| {
+        row.entries().filter(|own| !to.fixed[own.0]).for_each(|(unknown, value)| {
             match unknown.checked_sub(first) {
                 Some(k) if k < *width => own[start + k] = value,
                 _ => others.push((unknown, value)),
@@ -187,7 +187,7 @@ impl<'a> Extended<'a> {
     }
 
     /// The inverse of the normal matrix of a local block; zero if it has none.
-    pub fn inverse(&self, local: usize, rows: &LocalRows) -> Few {
+    pub fn inverse(&self, local: usize, rows: &LocalRows) -> SmallVector {
         match rows.width {
             // Points: with a constant size, loops are unrolled.
             3 => self.inverse_of::<3>(local, rows),
@@ -195,10 +195,10 @@ impl<'a> Extended<'a> {
         }
     }
 
-    fn inverse_of<const D: usize>(&self, local: usize, rows: &LocalRows) -> Few {
+    fn inverse_of<const D: usize>(&self, local: usize, rows: &LocalRows) -> SmallVector {
         let range = self.equations.problem().layout().local_range(local);
         let count = if D > 0 { D } else { range.len() };
-        let mut normal = Few::from_elem(0.0, count * count);
+        let mut normal = SmallVector::from_elem(0.0, count * count);
         for (_, own, ..) in rows.rows() {
             for (a, row) in own.iter().zip(normal.chunks_exact_mut(count)) {
                 row.iter_mut().zip(own).for_each(|(sum, b)| *sum += a * b);
@@ -242,7 +242,7 @@ struct Sums {
     score: Vec<f64>,
     squares: Vec<f64>,
     /// What local blocks take up of the squares.
-    taken: Vec<f64>,
+    entries: Vec<f64>,
     /// Right-hand sides of unknowns that are not local: a row for each of these unknowns, which are numbered as they appear.
     rights: Vec<f64>,
     places: Vec<u32>,
@@ -312,7 +312,7 @@ impl WithSimd for Add<'_> {
         }
         for (right, solved) in right.chunks_exact(width).zip(solved.chunks_exact(width)) {
             for (row, &right) in right.iter().enumerate().filter(|own| *own.1 != 0.0) {
-                add_multiple(simd, &mut sums.taken[row * stride..][..width], right, solved);
+                add_multiple(simd, &mut sums.entries[row * stride..][..width], right, solved);
             }
         }
         let mut start = 0;
@@ -340,7 +340,7 @@ impl Sums {
             stride,
             score: vec![0.0; stride],
             squares: vec![0.0; stride * count],
-            taken: vec![0.0; stride * count],
+            entries: vec![0.0; stride * count],
             rights: vec![],
             places: vec![NONE; layout.unknowns() - first],
             unknowns: vec![],
@@ -417,7 +417,7 @@ impl Linearized {
         parts.push(retained(&extended, count));
 
         let (mut score, mut observations) = (DVector::zeros(count), vec![0; count]);
-        let [mut squares, mut taken] = [(); 2].map(|()| DMatrix::zeros(count, count));
+        let [mut squares, mut entries] = [(); 2].map(|()| DMatrix::zeros(count, count));
         // A parameter per row: the elements of an unknown follow each other.
         let mut rights = DMatrix::zeros(count, layout.unknowns() - layout.all_locals().end);
         for part in parts {
@@ -426,7 +426,7 @@ impl Linearized {
                 score[parameter] += part.score[i];
                 for (j, &other) in part.parameters.iter().enumerate() {
                     squares[(other, parameter)] += part.squares[i * part.stride + j];
-                    taken[(other, parameter)] += part.taken[i * part.stride + j];
+                    entries[(other, parameter)] += part.entries[i * part.stride + j];
                 }
             }
             for (&unknown, own) in part.unknowns.iter().zip(part.rights.chunks_exact(part.stride.max(1))) {
@@ -441,8 +441,8 @@ impl Linearized {
         let solve = |rights: &[f64]| self.factor.solve_reduced(rights);
         let solved = threads.install(|| parallel::map_each(some, &solve)).concat();
         let effects = DMatrix::from_vec(columns.nrows(), count, solved);
-        taken += rights * &effects;
-        let redundancy = &squares - (&taken + taken.transpose()) / 2.0;
+        entries += rights * &effects;
+        let redundancy = &squares - (&entries + entries.transpose()) / 2.0;
         Additional { score, squares, redundancy, effects, observations }
     }
 

@@ -165,8 +165,8 @@ pub fn moved(
                     .combinations,
             ),
         };
-        let apart = problem.model.step_between(&unknowns, reference);
-        let carried = threads.install(|| Carried::new(&motions, combinations, datum, &apart));
+        let difference = problem.model.step_between(&unknowns, reference);
+        let carried = threads.install(|| Carried::new(&motions, combinations, datum, &difference));
         let carried = carried.ok_or(DatumError::NotCarried)?;
         stalls += usize::from(carried.length >= least);
         if carried.length <= rounding || stalls == STALLS {
@@ -217,9 +217,14 @@ struct Carried {
 }
 
 impl Carried {
-    /// Fits carriers whose step to their references is `apart`. Without combinations all motions are free. None if the carriers do not
+    /// Fits carriers whose step to their references is `difference`. Without combinations all motions are free. None if the carriers do not
     /// separate all free motions.
-    fn new(motions: &Motions, combinations: Option<Mat<f64>>, datum: &Datum, apart: &[f64]) -> Option<Self> {
+    fn new(
+        motions: &Motions,
+        combinations: Option<Mat<f64>>,
+        datum: &Datum,
+        difference: &[f64],
+    ) -> Option<Self> {
         let (count, carriers) = (motions.vectors.len(), &datum.carriers);
         let d = combinations.as_ref().map_or(count, Mat::ncols);
         if carriers.len() < d {
@@ -240,7 +245,7 @@ impl Carried {
         }
         let factor = scaled.llt(Side::Lower).ok()?.L().to_owned();
         let combinations = combinations.unwrap_or_else(|| Mat::identity(count, count));
-        let distances = by_columns(carriers.len(), 1, |_| datum.of_carriers(apart));
+        let distances = by_columns(carriers.len(), 1, |_| datum.of_carriers(difference));
         let right = product(rows.transpose(), distances.as_ref());
         let mut amounts = Mat::from_fn(d, 1, |k, _| scale[k] * right[(k, 0)]);
         solve_lower_triangular_in_place(factor.as_ref(), amounts.as_mut(), Par::Seq);

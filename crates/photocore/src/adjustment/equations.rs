@@ -75,7 +75,7 @@ pub struct Row<'a> {
 impl Row<'_> {
     /// Returns the unknowns of the equation, with their coefficients.
     #[inline(always)]
-    pub fn taken(&self) -> impl Iterator<Item = (usize, f64)> {
+    pub fn entries(&self) -> impl Iterator<Item = (usize, f64)> {
         let [first, second, third] = self.coefficients;
         self.columns.iter().copied().zip(first.iter().chain(second).chain(third).copied())
     }
@@ -215,7 +215,7 @@ impl<'a> ObservationEquations<'a> {
             rows.constant.copy_from_slice(term.constant);
             rows.shared.copy_from_slice(term.coefficients);
             if let Some(fixed) = &self.fixed {
-                leave_out(rows.shared, columns.len(), term.unknowns().map(|unknown| fixed[unknown]));
+                zero_columns(rows.shared, columns.len(), term.unknowns().map(|unknown| fixed[unknown]));
             }
             let of = |row| EquationOf::Unknown(term.first + row);
             rows.each(columns, self.observation_sd.len() + term.first, of, &mut |row: &Row<'_>| {
@@ -297,7 +297,7 @@ impl<'a> ObservationEquations<'a> {
                 self.each_row(&mut buffers, local, |row| {
                     put(row, &mut z);
                     for (column, &z) in z.iter().enumerate().filter(|&(_, &z)| z != 0.0) {
-                        row.taken().for_each(|(unknown, value)| match unknown.checked_sub(others) {
+                        row.entries().for_each(|(unknown, value)| match unknown.checked_sub(others) {
                             None => own[column * width + unknown - first] += value * z,
                             Some(other) => shared[column * (unknowns - others) + other] += value * z,
                         });
@@ -319,7 +319,7 @@ impl<'a> ObservationEquations<'a> {
         self.each_other_row(false, |row| {
             put(row, &mut z);
             for (right, &z) in rights.chunks_exact_mut(unknowns).zip(&z) {
-                row.taken().for_each(|(unknown, value)| right[unknown] += value * z);
+                row.entries().for_each(|(unknown, value)| right[unknown] += value * z);
             }
         });
         rights
@@ -346,7 +346,7 @@ impl<'a> ObservationEquations<'a> {
         let zeros = || DMatrix::<f64>::zeros(steps.len(), steps.len());
         self.sum_rows(threads, zeros, |sum, row| {
             let mut changes = SmallVec::<[f64; 16]>::from_elem(0.0, steps.len());
-            for (unknown, a) in row.taken() {
+            for (unknown, a) in row.entries() {
                 let own = &turned[unknown * steps.len()..][..steps.len()];
                 changes.iter_mut().zip(own).for_each(|(sum, change)| *sum += a * change);
             }
@@ -402,8 +402,8 @@ impl Equations for ObservationEquations<'_> {
         self.adapt(local, group, rows);
     }
 
-    fn write_alike(&self, locals: &[u32], groups: &[u32], rows: &mut GroupRows<'_>) {
-        let written = self.at.observe_alike(locals, groups, self.observation_sd, rows);
+    fn write_batch(&self, locals: &[u32], groups: &[u32], rows: &mut GroupRows<'_>) {
+        let written = self.at.observe_batch(locals, groups, self.observation_sd, rows);
         // Shortcut for most equations, because the division into parts is slow.
         if written && self.reweighting.is_none() && self.fixed.is_none() {
             return;
@@ -424,7 +424,7 @@ impl Equations for ObservationEquations<'_> {
         rows.weigh(&self.observation_sd[layout.equations_of_tie(tie)]);
         self.reweigh(rows);
         if let Some(fixed) = &self.fixed {
-            leave_out(
+            zero_columns(
                 rows.of_tie(),
                 layout.ties()[tie].rows,
                 layout.tie_columns(tie).map(|unknown| fixed[unknown]),
@@ -449,9 +449,9 @@ impl ObservationEquations<'_> {
         if let Some(fixed) = &self.fixed {
             let (layout, count) = (self.problem.layout(), rows.constant.len());
             let of = |unknown: usize| fixed[unknown];
-            leave_out(rows.local, count, layout.local_range(local).map(of));
-            leave_out(rows.retained, count, layout.retained_range(layout.retained_of(group)).map(of));
-            leave_out(rows.shared, count, layout.shared_columns(group).map(of));
+            zero_columns(rows.local, count, layout.local_range(local).map(of));
+            zero_columns(rows.retained, count, layout.retained_range(layout.retained_of(group)).map(of));
+            zero_columns(rows.shared, count, layout.shared_columns(group).map(of));
         }
     }
 
@@ -527,7 +527,7 @@ fn exclude(row: usize, constant: &mut [f64], parts: &mut [&mut [f64]]) {
 
 /// Zeroes the columns of fixed unknowns; `fixed` has one flag per column.
 #[inline(always)]
-fn leave_out(part: &mut [f64], rows: usize, fixed: impl Iterator<Item = bool>) {
+fn zero_columns(part: &mut [f64], rows: usize, fixed: impl Iterator<Item = bool>) {
     let width = part.len() / rows;
     for (column, _) in fixed.enumerate().filter(|&(_, fixed)| fixed) {
         (0..rows).for_each(|row| part[row * width + column] = 0.0);

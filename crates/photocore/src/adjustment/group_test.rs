@@ -12,7 +12,7 @@ use smallvec::SmallVec;
 pub const VISIBLE: f64 = 1e-6;
 
 /// Values of a group, on the stack: nearly all groups have two rows, and there are as many groups as image observations.
-pub type Few = SmallVec<[f64; 4]>;
+pub type SmallVector = SmallVec<[f64; 4]>;
 
 /// Test of the hypothesis that a group of observations has a gross error.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,9 +22,9 @@ pub struct GroupTest {
     /// T: decrease of the sum of squares without the group.
     pub statistic: f64,
     /// Estimated error ~d in standard deviations; zero in undetectable directions.
-    pub error: Few,
+    pub error: SmallVector,
     /// R^-, row by row: cofactors of the estimated error.
-    pub cofactors: Few,
+    pub cofactors: SmallVector,
     /// Smallest redundancy of a detectable direction; NaN if there is none.
     pub least: f64,
     /// Maximum fraction h of the redundancy of a direction that unknowns other than the own point absorb. It bounds correlations: |rho| <=
@@ -82,8 +82,8 @@ impl GroupTest {
         let root = DMatrix::from_diagonal(&values.map(|value| value.sqrt().recip()));
         let half = &vectors * root;
         let shared = known.filter(|_| !shown.is_empty()).map_or(f64::NAN, |known| {
-            let taken = DMatrix::from_row_slice(count, count, known) - &r;
-            (half.tr_mul(&taken) * &half).symmetric_eigenvalues().max().max(0.0)
+            let entries = DMatrix::from_row_slice(count, count, known) - &r;
+            (half.tr_mul(&entries) * &half).symmetric_eigenvalues().max().max(0.0)
         });
         Self {
             rank: shown.len(),

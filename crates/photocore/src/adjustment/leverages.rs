@@ -142,13 +142,13 @@ impl Leverages {
         let found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
         let mut found = found.into_iter().collect::<Result<Vec<_>, _>>()?;
         if let Some(limit) = limit {
-            self.put_together(problem, observation_sd, (locals, limit), &mut found, threads)?;
+            self.add_cofactors_between_groups(problem, observation_sd, (locals, limit), &mut found, threads)?;
         }
         Ok(found)
     }
 
     /// Computes cofactors between groups of fixed local blocks from the factor.
-    fn put_together(
+    fn add_cofactors_between_groups(
         &self,
         problem: &AnyProblem<'_>,
         observation_sd: &[f64],
@@ -161,8 +161,8 @@ impl Leverages {
             let rows = correlated_rows(&found[place], layout, local, limit);
             (place, local, rows)
         };
-        let apart = locals.iter().enumerate().filter(|&(_, &local)| layout.stands_apart(local));
-        let chosen: Vec<_> = apart.map(chosen_on).filter(|(.., rows)| !rows.is_empty()).collect();
+        let difference = locals.iter().enumerate().filter(|&(_, &local)| layout.has_uncoupled_groups(local));
+        let chosen: Vec<_> = difference.map(chosen_on).filter(|(.., rows)| !rows.is_empty()).collect();
         if chosen.is_empty() {
             return Ok(());
         }
@@ -202,7 +202,7 @@ impl Leverages {
         let mut buffers = Buffers::default();
         let mut of_tie = |&tie: &usize| {
             let mut rows = vec![];
-            asked.each_row_of_tie(&mut buffers, tie, |row| rows.push(row.taken().collect()));
+            asked.each_row_of_tie(&mut buffers, tie, |row| rows.push(row.entries().collect()));
             rows
         };
         ties.iter().map(&mut of_tie).collect()
@@ -266,9 +266,9 @@ impl Leverages {
 /// Returns the equations of the groups and of the ties of a local block.
 fn rows_of_local(equations: &ObservationEquations<'_>, local: usize) -> (Vec<Function>, Vec<Function>) {
     let (mut of_groups, mut of_ties, mut buffers) = (vec![], vec![], Buffers::default());
-    equations.each_row(&mut buffers, local, |row| of_groups.push(row.taken().collect()));
+    equations.each_row(&mut buffers, local, |row| of_groups.push(row.entries().collect()));
     for &tie in equations.problem().layout().ties_of(local) {
-        equations.each_row_of_tie(&mut buffers, tie as usize, |row| of_ties.push(row.taken().collect()));
+        equations.each_row_of_tie(&mut buffers, tie as usize, |row| of_ties.push(row.entries().collect()));
     }
     (of_groups, of_ties)
 }

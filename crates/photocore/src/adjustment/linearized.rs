@@ -9,7 +9,7 @@ use super::datum::Basis;
 use super::equations::ObservationEquations;
 use super::loss::{Loss, Reweighting};
 use super::problem::AnyProblem;
-use super::result::{AdjustError, Seconds, gib};
+use super::result::{AdjustError, PhaseTimes, format_bytes};
 use super::transformation::Transformation;
 use crate::normals::{
     Cofactors, Factor, FactorOptions, Function, Inversion, InvertOptions, SelectedInverse, SolveOptions,
@@ -32,7 +32,7 @@ pub struct Linearized {
     #[doc(hidden)]
     pub transformation: Option<Transformation>,
     /// Computing time so far.
-    pub(super) seconds: Seconds,
+    pub(super) seconds: PhaseTimes,
 }
 
 /// Selected inverse of the normal matrix of a problem at given values.
@@ -53,14 +53,14 @@ pub struct Inverted {
     /// distant, or if a datum is weak.
     pub lost: Option<f64>,
     /// Computing time in total.
-    pub(super) seconds: Seconds,
+    pub(super) seconds: PhaseTimes,
 }
 
 /// Error of the computation of cofactors.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum CofactorError {
     /// The cofactors need more memory than allowed.
-    #[error("these cofactors take {} of memory, and {} are free: ask for fewer at a time", gib(*.needed), gib(*.available))]
+    #[error("these cofactors take {} of memory, and {} are free: ask for fewer at a time", format_bytes(*.needed), format_bytes(*.available))]
     Memory {
         /// Required bytes.
         needed: usize,
@@ -105,7 +105,8 @@ impl Linearized {
         let factor = problem.system.factor(equations, options, context)?;
         let sum_of_squares = factor.sum_of_squares + equations.terms().sum_of_squares(0..values.len());
         let (took, share) = (start.elapsed().as_secs_f64(), factor.formation_share);
-        let seconds = Seconds { form: took * share, factor: took * (1.0 - share), ..Seconds::default() };
+        let seconds =
+            PhaseTimes { form: took * share, factor: took * (1.0 - share), ..PhaseTimes::default() };
         Ok(Self {
             values,
             held,
@@ -133,7 +134,7 @@ impl Linearized {
             factor,
             basis: None,
             transformation: None,
-            seconds: Seconds::default(),
+            seconds: PhaseTimes::default(),
         }
     }
 

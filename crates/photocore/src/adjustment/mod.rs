@@ -62,12 +62,13 @@
 mod acceleration;
 mod additional;
 mod alone;
+mod anderson;
 mod control;
 mod datum;
 mod distributions;
 mod end;
-mod ended;
 mod equations;
+mod final_results;
 mod group_test;
 mod leverages;
 mod linearized;
@@ -80,7 +81,6 @@ mod problem;
 mod result;
 mod run;
 mod score_parts;
-mod secants;
 mod statistics;
 mod steps;
 mod terms;
@@ -101,7 +101,9 @@ pub use distributions::{
 pub use equations::EquationOf;
 #[doc(hidden)]
 pub use equations::ObservationEquations;
-pub use group_test::{Few, GroupTest, VISIBLE, correlation_above, leverage_odds, may_correlate, whitening};
+pub use group_test::{
+    GroupTest, SmallVector, VISIBLE, correlation_above, leverage_odds, may_correlate, whitening,
+};
 pub use leverages::Leverages;
 pub use linearized::{CofactorError, Inverted, Linearized};
 pub use loss::Loss;
@@ -114,8 +116,8 @@ pub use noncentral::{
 pub use observation_rows::ObservationRows;
 pub use options::{History, Method, Options, Published, Status, Stop};
 pub use problem::{AnyProblem, Evaluated, Model, Motions, Problem};
-pub(crate) use result::gib;
-pub use result::{AdjustError, Adjustment, Effort, Seconds};
+pub(crate) use result::format_bytes;
+pub use result::{AdjustError, Adjustment, PhaseTimes, SolverStats};
 pub use run::{Requests, adjust, adjust_with};
 pub use score_parts::{Groups, ScoreParts};
 #[doc(hidden)]

@@ -42,7 +42,7 @@ pub(super) struct Sums {
     /// (a . g_k) (a . g_m), and separate terms of weighted or fixed unknowns.
     together: Vec<f64>,
     /// Sum of (a_i g_ik)^2 over the unknowns i.
-    apart: Vec<[f64; LANES]>,
+    difference: Vec<[f64; LANES]>,
     /// Scratch memory for the a . g_k of a row.
     along: Vec<[f64; LANES]>,
 }
@@ -51,27 +51,27 @@ impl Sums {
     /// Creates zero sums for `parts` vectors of candidates.
     fn zero(parts: usize) -> Self {
         let none = vec![[0.0; LANES]; parts];
-        Self { together: vec![0.0; (parts * LANES).pow(2)], apart: none.clone(), along: none }
+        Self { together: vec![0.0; (parts * LANES).pow(2)], difference: none.clone(), along: none }
     }
 
     /// Returns the maximum over `count` candidates of the joint change relative to the separate changes by single unknowns.
     pub fn share(&self, count: usize) -> f64 {
-        let stride = self.apart.len() * LANES;
+        let stride = self.difference.len() * LANES;
         let share = |k: usize| {
-            let apart = self.apart.as_flattened()[k];
-            if apart > 0.0 { (self.together[k * stride + k] / apart).sqrt() } else { 0.0 }
+            let difference = self.difference.as_flattened()[k];
+            if difference > 0.0 { (self.together[k * stride + k] / difference).sqrt() } else { 0.0 }
         };
         (0..count).map(share).fold(0.0, f64::max)
     }
 
     fn multiply(&mut self, factor: f64) {
-        let apart = self.apart.as_flattened_mut().iter_mut();
-        self.together.iter_mut().chain(apart).for_each(|sum| *sum *= factor);
+        let difference = self.difference.as_flattened_mut().iter_mut();
+        self.together.iter_mut().chain(difference).for_each(|sum| *sum *= factor);
     }
 
     fn add(&mut self, other: &Self) {
         self.together.iter_mut().zip(&other.together).for_each(|(sum, value)| *sum += value);
-        let (own, other) = (self.apart.as_flattened_mut(), other.apart.as_flattened());
+        let (own, other) = (self.difference.as_flattened_mut(), other.difference.as_flattened());
         own.iter_mut().zip(other).for_each(|(sum, value)| *sum += value);
     }
 }
@@ -131,18 +131,18 @@ impl<'a> Candidates<'a> {
             let along = sums.along.as_flattened_mut()[motion..].iter_mut();
             along.zip(&carried[row]).for_each(|(along, by)| *along = by / sd);
         }
-        self.add_to_row(sums, row.taken());
+        self.add_to_row(sums, row.entries());
     }
 
     /// Adds a row to the current changes in `sums.along`.
     fn add_to_row(&self, sums: &mut Sums, row: impl Iterator<Item = (usize, f64)>) {
         for (unknown, coefficient) in row {
             let moved = self.of(unknown);
-            for ((along, apart), moved) in sums.along.iter_mut().zip(&mut sums.apart).zip(moved) {
+            for ((along, difference), moved) in sums.along.iter_mut().zip(&mut sums.difference).zip(moved) {
                 for k in 0..LANES {
                     let change = coefficient * moved[k];
                     along[k] += change;
-                    apart[k] += change * change;
+                    difference[k] += change * change;
                 }
             }
             if self.fixed[unknown] {
@@ -191,8 +191,8 @@ impl AnyProblem<'_> {
     ) -> Option<Open> {
         let sums = self.sums(values, motions, released, threads);
         let count = motions.vectors.len();
-        let stride = sums.apart.len() * LANES;
-        let scale: Vec<f64> = sums.apart.as_flattened()[..count]
+        let stride = sums.difference.len() * LANES;
+        let scale: Vec<f64> = sums.difference.as_flattened()[..count]
             .iter()
             .map(|&sum| if sum > 0.0 { sum.sqrt().recip() } else { 0.0 })
             .collect();
@@ -235,7 +235,7 @@ impl AnyProblem<'_> {
         let chunk = |chunk: usize| {
             let (mut sums, mut buffers) = (candidates.sums(), Buffers::default());
             for local in chunk * AT_ONCE..((chunk + 1) * AT_ONCE).min(sample) {
-                let add = |row: &Row<'_>| candidates.add_row(&mut sums, row.taken());
+                let add = |row: &Row<'_>| candidates.add_row(&mut sums, row.entries());
                 equations.each_row(&mut buffers, local * stride, add);
             }
             sums
@@ -247,7 +247,7 @@ impl AnyProblem<'_> {
             .for_each(|part| sums.add(part));
         sums.multiply(stride as f64);
         let is_released = |row: &Row<'_>| {
-            matches!(row.of, EquationOf::Unknown(_)) && !row.taken().all(|(unknown, _)| stays(&unknown))
+            matches!(row.of, EquationOf::Unknown(_)) && !row.entries().all(|(unknown, _)| stays(&unknown))
         };
         equations.each_other_row(false, |row| {
             if !is_released(row) {
@@ -317,7 +317,7 @@ impl AnyProblem<'_> {
         let mut buffers = Buffers::default();
         if let Some(groups) = sums.first_mut() {
             for local in 0..layout.locals() {
-                equations.each_row(&mut buffers, local, |row| candidates.add_row(groups, row.taken()));
+                equations.each_row(&mut buffers, local, |row| candidates.add_row(groups, row.entries()));
             }
         }
         let mut observed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();
@@ -325,7 +325,7 @@ impl AnyProblem<'_> {
             EquationOf::Tie { tie, .. } => {
                 candidates.add_other_row(&mut sums[classes.of_ties[tie]], &equations, row);
             }
-            _ => row.taken().for_each(|(unknown, _)| observed[unknown] = true),
+            _ => row.entries().for_each(|(unknown, _)| observed[unknown] = true),
         });
         let mut shares: Vec<f64> = sums.iter().map(|own| own.share(count)).collect();
         for (unknown, &class) in classes.of_unknowns.iter().enumerate() {

@@ -19,7 +19,7 @@ impl ObservationRows {
     /// Creates the rows at given values, without columns of fixed or constrained unknowns.
     pub fn new(problem: &AnyProblem<'_>, values: &[f64], held: &[usize], threads: &Threads) -> Self {
         let equations = ObservationEquations::new(problem, None, values, held, threads);
-        let add = |found: &mut Self, row: &Row<'_>| found.push(row.taken(), row.constant);
+        let add = |found: &mut Self, row: &Row<'_>| found.push(row.entries(), row.constant);
         let mut all = Self::empty();
         equations.fold_rows(threads, Self::empty, add).into_iter().for_each(|part| all.append(part));
         equations.each_prior(&mut Buffers::default(), 0..values.len(), |row| {

@@ -46,7 +46,7 @@ pub enum Method {
     /// Full Gauss-Newton steps without control of the sum of squares, in the unknowns of the published programs.
     Full(Published),
     /// Full steps; a step that raises the sum of squares is repeated with damping (Levenberg-Marquardt) until damping is unnecessary. In
-    /// case of slow convergence ([`super::Model::ends_slowly`]) a full step is followed by a chord.
+    /// case of slow convergence ([`super::Model::converges_linearly`]) a full step is followed by a chord.
     Damped(Stop),
     /// Damped steps from the start, controlled by the gain ratio of actual to predicted decrease (Levenberg-Marquardt, Nielsen 1999): for
     /// poor initial values. Damping replaces a missing datum; the datum is constrained at the end, for the cofactors.

@@ -36,19 +36,19 @@ pub trait Model: Sync {
 
     /// Returns the number of groups whose blocks at these values are outside the layout; the missing columns are omitted. If there are
     /// many, or if steps are short, the iterations end and the caller creates a new layout.
-    fn outgrown(&self, _unknowns: &[f64]) -> usize {
+    fn pattern_violations(&self, _unknowns: &[f64]) -> usize {
         0
     }
 
     /// Whether the last steps converge only linearly, because second derivatives times residuals matter for weakly determined unknowns.
     /// Chord steps then save time (see [`super::Method::Damped`]).
-    fn ends_slowly(&self) -> bool {
+    fn converges_linearly(&self) -> bool {
         false
     }
 
     /// Whether weakly determined combinations of unknowns may make full steps oscillate or creep. Full steps are then accelerated with
     /// previous ones, and shortened if the sum of squares rises.
-    fn steps_swing(&self) -> bool {
+    fn may_oscillate(&self) -> bool {
         false
     }
 
@@ -90,7 +90,7 @@ pub trait Evaluated: Send + Sync {
     /// Writes [`Evaluated::observe`] for one group per local block, in sequence and with unit weight. `groups` contains their numbers, `sd`
     /// the standard deviations of all observations. All groups have the same main block and the same shared blocks. Returns false if not
     /// supported.
-    fn observe_alike(
+    fn observe_batch(
         &self,
         _locals: &[u32],
         _groups: &[u32],
@@ -101,7 +101,7 @@ pub trait Evaluated: Send + Sync {
     }
 
     /// Writes only the misclosures of [`Evaluated::observe`]; returns false if not supported.
-    fn misclose(&self, _local: usize, _group: usize, _constant: &mut [f64]) -> bool {
+    fn write_misclosure(&self, _local: usize, _group: usize, _constant: &mut [f64]) -> bool {
         false
     }
 
@@ -116,7 +116,7 @@ pub trait Evaluated: Send + Sync {
 
     /// Returns local blocks that diverge to infinity: they would reduce the sum of squares slowly until the last iteration. Called in a
     /// trust region after a short step, with the unknowns before it.
-    fn run_off(&self, _before: &[f64]) -> Vec<usize> {
+    fn diverging(&self, _before: &[f64]) -> Vec<usize> {
         vec![]
     }
 

@@ -9,7 +9,7 @@ use crate::{Iteration, Stopped};
 
 /// Computing time of each phase in seconds, over all iterations.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Seconds {
+pub struct PhaseTimes {
     /// Formation, with the reduction of local blocks.
     pub form: f64,
     /// Factorisation.
@@ -22,7 +22,7 @@ pub struct Seconds {
     pub cofactors: f64,
 }
 
-impl Seconds {
+impl PhaseTimes {
     pub(super) fn add(&mut self, other: &Self) {
         self.form += other.form;
         self.factor += other.factor;
@@ -34,13 +34,13 @@ impl Seconds {
 
 /// Computational effort and elimination order of an adjustment.
 #[derive(Debug, Clone)]
-pub struct Effort {
+pub struct SolverStats {
     /// Predicted multiply-adds per execution of each phase.
     pub operations: Operations,
     /// Number of formations and factorisations.
     pub formations: usize,
     /// Time by phase.
-    pub seconds: Seconds,
+    pub seconds: PhaseTimes,
     /// The chosen ordering.
     pub ordering: Ordering,
     /// Compared orderings with predicted multiply-adds of a factorisation; None if the layout is too large for one.
@@ -99,7 +99,7 @@ pub struct Adjustment {
     /// Numbers of observations and unknowns.
     pub counts: Counts,
     /// Computational effort.
-    pub effort: Effort,
+    pub effort: SolverStats,
 }
 
 impl Adjustment {
@@ -116,7 +116,7 @@ impl Adjustment {
     }
 
     /// Prepends the iterations and effort of an earlier adjustment of the same observations.
-    pub(crate) fn go_on_from(&mut self, before: Option<Self>) {
+    pub(crate) fn prepend(&mut self, before: Option<Self>) {
         let Some(before) = before else { return };
         let done = before.iterations.len();
         self.iterations.iter_mut().for_each(|iteration| iteration.number += done);
@@ -196,7 +196,11 @@ impl From<SystemError> for AdjustError {
 }
 
 /// Formats a number of bytes for a message.
-pub(crate) fn gib(bytes: usize) -> String {
-    let gib = bytes as f64 / f64::from(1 << 30);
-    if gib < 0.1 { format!("{:.1} MiB", 1024.0 * gib) } else { format!("{gib:.1} GiB") }
+pub(crate) fn format_bytes(bytes: usize) -> String {
+    let format_bytes = bytes as f64 / f64::from(1 << 30);
+    if format_bytes < 0.1 {
+        format!("{:.1} MiB", 1024.0 * format_bytes)
+    } else {
+        format!("{format_bytes:.1} GiB")
+    }
 }

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Instant;
 
+use super::anderson::AndersonHistory;
 use super::control::{AFTER_FAILURES, ALWAYS, NEAR};
 use super::datum::{Adjusted, Basis, Datum, moved};
 use super::equations::ObservationEquations;
@@ -10,8 +11,7 @@ use super::linearized::Linearized;
 use super::loss::Reweighting;
 use super::options::{Method, Options, Published, Status, leaves_cofactors};
 use super::problem::{AnyProblem, Evaluated, Model, Problem};
-use super::result::{AdjustError, Adjustment, Seconds};
-use super::secants::Secants;
+use super::result::{AdjustError, Adjustment, PhaseTimes};
 use crate::normals::{FactorOptions, InvertOptions, SolveOptions};
 use crate::{Context, Event, Iteration, Threads};
 
@@ -71,14 +71,14 @@ pub fn adjust_with(
         is_near: false,
         has_moved: false,
         context: context.reborrow(),
-        seconds: Seconds::default(),
+        seconds: PhaseTimes::default(),
         formations: 0,
         iterations: vec![],
         history: vec![],
         last_corrections: vec![0.0; problem.initial.len()],
         datum: vec![],
         chord: None,
-        secants: Secants::default(),
+        anderson: AndersonHistory::default(),
         curved: false,
         weak: vec![],
         collapsed: vec![],
@@ -174,7 +174,7 @@ pub(super) struct Run<'a, 'w> {
     /// Whether the network was transformed during the iterations.
     has_moved: bool,
     pub context: Context<'w>,
-    pub(super) seconds: Seconds,
+    pub(super) seconds: PhaseTimes,
     formations: usize,
     pub iterations: Vec<Iteration>,
     history: Vec<Vec<f64>>,
@@ -184,7 +184,7 @@ pub(super) struct Run<'a, 'w> {
     /// Length of the chord after the last step, if any.
     pub chord: Option<f64>,
     /// History of full steps for their acceleration in case of slow convergence.
-    pub secants: Secants,
+    pub anderson: AndersonHistory,
     /// Whether to use the second-order term of the loss: as soon as steps are short.
     pub curved: bool,
     /// Unknowns in a combination that full steps cannot follow (see [`Adjustment::weak`]).
@@ -251,7 +251,7 @@ impl<'a> Run<'a, '_> {
     }
 
     /// Predicts from quadratic convergence of full steps whether the next linearization is the last.
-    pub(super) fn look_ahead(&mut self, last: &Iteration) {
+    pub(super) fn predict_last(&mut self, last: &Iteration) {
         let full = |iteration: &Iteration| iteration.damping == 0.0;
         let before = self.iterations.last().filter(|before| full(before) && full(last));
         let next = before.map(|before| last.largest_change.powi(3) / before.largest_change.powi(2));

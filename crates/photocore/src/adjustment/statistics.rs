@@ -142,7 +142,7 @@ impl AnyProblem<'_> {
             let mut own = residuals.chunks_exact_mut(rows.max(1));
             for local in locals {
                 for (group, own) in layout.groups_of(local).zip(&mut own) {
-                    if !at.misclose(local, group, own) {
+                    if !at.write_misclosure(local, group, own) {
                         let mut rows = buffers.rows.group(layout, group);
                         at.observe(local, group, &mut rows);
                         own.copy_from_slice(rows.constant);

@@ -134,7 +134,7 @@ impl<'a> Run<'a, '_> {
         let moved = if full { state.moved(&accelerated.step) } else { vec![] };
         let before = state.recycle();
         let values = self.relocated(accelerated.values, iteration.largest_change, control);
-        if accelerated.outgrown {
+        if accelerated.pattern_violations {
             let sum_of_squares = self.objective(&values);
             if sum_of_squares <= control.best * (1.0 + ROUNDING) {
                 self.accept(Iteration { sum_of_squares, ..iteration }, &before, &values)?;
@@ -148,7 +148,7 @@ impl<'a> Run<'a, '_> {
         let reached = match evaluated {
             Some((at, sum_of_squares)) => Reached::Evaluated(values, at, sum_of_squares),
             None => {
-                self.look_ahead(&iteration);
+                self.predict_last(&iteration);
                 Reached::Formed(Box::new(self.form(values, control.eased(damping, f64::NAN))?))
             }
         };
@@ -158,8 +158,8 @@ impl<'a> Run<'a, '_> {
         let last = control.always() && control.is_last_damped(&iteration, predicted);
         if reached.succeeds(&iteration, gain, control.best) {
             let next = self.follow(reached, iteration, &before, (gain, last), control);
-            if full && self.problem.model.steps_swing() {
-                self.secants.remember(step, before);
+            if full && self.problem.model.may_oscillate() {
+                self.anderson.remember(step, before);
             }
             return next;
         }
@@ -201,7 +201,7 @@ impl<'a> Run<'a, '_> {
         let short = control.always() && iteration.largest_change < SHORT;
         if iteration.damping > 0.0 {
             self.collapsed = self.context.threads.install(|| match reached.at().collapsed(before) {
-                none if none.is_empty() && short => reached.at().run_off(before),
+                none if none.is_empty() && short => reached.at().diverging(before),
                 found => found,
             });
         }
@@ -253,12 +253,12 @@ impl<'a> Run<'a, '_> {
 
     /// Whether a full step makes too many groups leave the layout: more than a fraction, or any after a short step. Missing columns would
     /// disturb chords and last steps.
-    pub(super) fn is_outgrown(&self, step: &Iteration, followed: bool, values: &[f64]) -> bool {
+    pub(super) fn leaves_pattern(&self, step: &Iteration, followed: bool, values: &[f64]) -> bool {
         let short = followed || step.largest_change <= SETTLED;
         let most = if short { 0 } else { self.problem.layout().groups() / FEW };
         step.damping == 0.0
-            && self.problem.model.steps_swing()
-            && self.context.threads.install(|| self.problem.model.outgrown(values)) > most
+            && self.problem.model.may_oscillate()
+            && self.context.threads.install(|| self.problem.model.pattern_violations(values)) > most
     }
 
     /// Recomputes the local unknowns after a long step if that lowers the sum of squares.
@@ -288,7 +288,7 @@ impl<'a> Run<'a, '_> {
 
     /// Whether the sum of all further steps is within a limit; unknown for accelerated steps.
     fn leaves_less_than(&self, limit: f64, change: f64) -> bool {
-        let learns = self.secants.correct() || self.problem.model.steps_swing() && self.chord.is_some();
+        let learns = self.anderson.correct() || self.problem.model.may_oscillate() && self.chord.is_some();
         !learns && self.history().leaves_less_than(limit, change)
     }
 

@@ -37,8 +37,8 @@ impl RotationSense {
         let found = numbers.regular_numbers(&(numbers.attitude(angles) * angle_axis_rotation(rho)));
         let other = [found[0] + PI, PI - found[1], found[2] + PI];
         let [found, other] = [found, other].map(|triple| nearest_turns(triple, angles));
-        let apart = |triple: &[f64; 3]| (Vector3::from(*triple) - Vector3::from(angles)).norm_squared();
-        if apart(&other) < apart(&found) { other } else { found }
+        let difference = |triple: &[f64; 3]| (Vector3::from(*triple) - Vector3::from(angles)).norm_squared();
+        if difference(&other) < difference(&found) { other } else { found }
     }
 }
 

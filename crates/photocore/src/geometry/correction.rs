@@ -32,7 +32,7 @@ pub struct Correction {
 
 /// Corrected position with its partials; the first index is x or y.
 #[derive(Debug, Clone, Copy)]
-pub struct Placed {
+pub struct CorrectedPosition {
     /// Corrected x, y.
     pub xy: [f64; 2],
     /// With respect to the reading.
@@ -117,7 +117,7 @@ impl Correction {
     }
 
     /// Returns the corrected position of a reading with all partials.
-    pub fn linearize(&self, reading: [f64; 2]) -> Placed {
+    pub fn linearize(&self, reading: [f64; 2]) -> CorrectedPosition {
         let linear = self.linear();
         let straight = times(&linear.matrix, reading);
         let (xy, by_straight) = self.bowed(straight);
@@ -129,7 +129,11 @@ impl Correction {
             own[LINEAR + COEFFICIENTS * row..][..COEFFICIENTS].copy_from_slice(&functions);
         }
         let columns = [0, 1].map(|k| times(&by_straight, linear.matrix.map(|row| row[k])));
-        Placed { xy, by_reading: [0, 1].map(|row| columns.map(|column| column[row])), by_parameters }
+        CorrectedPosition {
+            xy,
+            by_reading: [0, 1].map(|row| columns.map(|column| column[row])),
+            by_parameters,
+        }
     }
 
     /// Returns the reading of a corrected position; None if the polynomials are not invertible there.

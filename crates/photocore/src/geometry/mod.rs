@@ -58,4 +58,4 @@ pub use refraction::{AirModel, Refraction, Vertical, Water, WaterModel};
 #[doc(hidden)]
 pub use rotation::principal_axes;
 pub use rotation::{Matrix3, Vector3, nearest_turns, rotation, rotation_angles};
-pub use space::{Lift, ObjectSpace, Point};
+pub use space::{ObjectSpace, Point, RefractionOffset};

@@ -7,7 +7,7 @@ use super::attitude::{AttitudeNumbers, RotationSense};
 use super::ellipsoid::{local_vertical, local_vertical_turns};
 use super::pose::{POSE, Pose, column};
 use super::rotation::{Matrix3, Vector3};
-use super::space::{Lift, ObjectSpace, Point};
+use super::space::{ObjectSpace, Point, RefractionOffset};
 
 /// Parametrization of the six unknowns of a pose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -173,7 +173,7 @@ impl Orientation {
                 [0, 1, 2].map(|k| (k, columns.column(k).normalize().dot(&way)))
             }
             Unknowns::Vectors { .. } => {
-                let u = self.pose.sight(place);
+                let u = self.pose.to_camera_frame(place);
                 [0, 1, 2].map(|k| (3 + k, u[k]))
             }
         }
@@ -210,17 +210,17 @@ impl Orientation {
 
     /// Returns u, the point in the photo's axes.
     #[inline(always)]
-    pub fn sight(&self, point: &Point) -> Vector3 {
-        self.pose.sight(&point.position())
+    pub fn to_camera_frame(&self, point: &Point) -> Vector3 {
+        self.pose.to_camera_frame(&point.position())
     }
 
     /// Returns the orientation for a lifted point: the partials of the lift by the photo's position are added. Only for positions.
-    pub fn under(&self, lift: &Lift) -> Self {
-        let mut lifted = *self;
-        if let Unknowns::Position { shifts, .. } = &mut lifted.unknowns {
-            *shifts = Some(lift.by_photo - self.centre_partials());
+    pub fn with_offset(&self, offset: &RefractionOffset) -> Self {
+        let mut with_offset = *self;
+        if let Unknowns::Position { shifts, .. } = &mut with_offset.unknowns {
+            *shifts = Some(offset.by_photo - self.centre_partials());
         }
-        lifted
+        with_offset
     }
 
     /// Returns the partials of one image coordinate with respect to the six unknowns and to the coordinates of the point. g is its gradient

@@ -70,7 +70,7 @@ pub(super) fn column(shift: &Vector3, rho: &Vector3) -> Vector6<f64> {
 impl Pose {
     /// Returns u, a point in the photo's axes.
     #[inline(always)]
-    pub fn sight(&self, point: &Vector3) -> Vector3 {
+    pub fn to_camera_frame(&self, point: &Vector3) -> Vector3 {
         // A^T d axis by axis: nalgebra's generic transposed product is not inlined in this hot loop.
         let d = point - self.position;
         Vector3::from_fn(|k, _| self.attitude.column(k).dot(&d))

@@ -66,14 +66,14 @@ impl<C: CameraModel> View<C> {
     /// Returns the image position of a point; not finite for a point in the plane u3 = 0 of the projection centre.
     #[inline]
     pub fn project(&self, point: &Point) -> [f64; 2] {
-        self.camera.image(&self.orientation.sight(point))
+        self.camera.image(&self.orientation.to_camera_frame(point))
     }
 
     /// Returns the image position of a point and its partials; not finite for a point in the plane u3 = 0 of the projection centre. Points
     /// behind the camera are not rejected.
     #[inline(always)]
     pub fn linearize(&self, point: &Point) -> Projection<C::Parameters> {
-        let u = self.orientation.sight(point);
+        let u = self.orientation.to_camera_frame(point);
         self.orientation.projection(&u, &self.camera.linearize(&u), point)
     }
 

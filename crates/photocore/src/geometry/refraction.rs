@@ -8,7 +8,7 @@ use super::atmosphere::{Air, SCALE_HEIGHT};
 use super::ellipsoid::{GeometryError, local_vertical};
 use super::orientation::Orientation;
 use super::rotation::{Matrix3, Vector3};
-use super::space::{Lift, ObjectSpace, Point};
+use super::space::{ObjectSpace, Point, RefractionOffset};
 
 /// Refractivity n - 1 of air at sea level (Saastamoinen 1974).
 const REFRACTIVITY: f64 = 277.0e-6;
@@ -127,26 +127,32 @@ impl Refraction {
     }
 
     /// Returns the lift of a point for one photo; `station` and `foot` are the verticals at photo and point.
-    pub fn lift(&self, photo: &Orientation, station: &Vertical, point: &Point, foot: &Vertical) -> Lift {
+    pub fn offset(
+        &self,
+        photo: &Orientation,
+        station: &Vertical,
+        point: &Point,
+        foot: &Vertical,
+    ) -> RefractionOffset {
         let d = point.position() - photo.centre();
         let (square, drop) = (d.norm_squared(), -station.up.dot(&d));
         let mut bending = self.air(station, foot);
-        let mut lift = Lift::none();
+        let mut offset = RefractionOffset::none();
         if let Some(water) = &self.water {
             match water.model {
                 WaterModel::Giant => bending.add(&water.bending(square - drop * drop, station, foot)),
                 WaterModel::Snell => {
                     let rise = water.rise(square, -foot.up.dot(&d), foot);
-                    let turned = add(&mut lift, &rise, foot, &d, photo, point);
-                    lift.by_point += turned;
+                    let turned = add(&mut offset, &rise, foot, &d, photo, point);
+                    offset.by_point += turned;
                 }
             }
         }
         if bending.value != 0.0 {
-            let turned = add(&mut lift, &bending.rise(square, drop), station, &d, photo, point);
-            lift.by_photo += turned;
+            let turned = add(&mut offset, &bending.rise(square, drop), station, &d, photo, point);
+            offset.by_photo += turned;
         }
-        lift
+        offset
     }
 
     /// Returns K_a between a camera and a point.
@@ -315,7 +321,7 @@ impl Water {
 /// Adds a rise along a vertical to a lift. Returns the partials due to the rotation of the vertical, which belong to the end of the ray at
 /// the vertical.
 fn add(
-    lift: &mut Lift,
+    offset: &mut RefractionOffset,
     rise: &Rise,
     vertical: &Vertical,
     d: &Vector3,
@@ -329,8 +335,8 @@ fn add(
     by_photo.z += rise.by_heights[0];
     by_point.z += rise.by_heights[1];
     let by_turning = -rise.by_drop * vertical.turning.tr_mul(d);
-    lift.vector += rise.value * up;
-    lift.by_photo += up * by_photo.transpose();
-    lift.by_point += up * by_point.transpose();
+    offset.vector += rise.value * up;
+    offset.by_photo += up * by_photo.transpose();
+    offset.by_point += up * by_point.transpose();
     up * by_turning.transpose() + rise.value * vertical.turning
 }

@@ -83,14 +83,14 @@ impl Point {
     }
 
     /// Returns the point displaced by a lift.
-    pub fn lifted(&self, lift: &Lift) -> Self {
-        Self { position: self.position + lift.vector, partials: Some(self.partials() + lift.by_point) }
+    pub fn with_offset(&self, offset: &RefractionOffset) -> Self {
+        Self { position: self.position + offset.vector, partials: Some(self.partials() + offset.by_point) }
     }
 }
 
 /// Apparent displacement of a point in one photo (see [`super::refraction`]): a cartesian vector, and its partials as columns.
 #[derive(Debug, Clone, Copy)]
-pub struct Lift {
+pub struct RefractionOffset {
     /// Vector from the point to its apparent position.
     pub vector: Vector3,
     /// Partials with respect to the position of the photo.
@@ -99,7 +99,7 @@ pub struct Lift {
     pub by_point: Matrix3,
 }
 
-impl Lift {
+impl RefractionOffset {
     /// Returns the zero lift.
     pub fn none() -> Self {
         Self { vector: Vector3::zeros(), by_photo: Matrix3::zeros(), by_point: Matrix3::zeros() }

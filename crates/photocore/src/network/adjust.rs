@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 use super::error::NetworkError;
 use super::input::{InnerConstraints, Network, NetworkDatum, Options, State};
 use super::problem::{Assembled, Reached};
-use super::screens::{Begin, Ended, Screening};
+use super::screens::{Restart, ScreenInput, Screening};
 use super::solution::{Joint, Solution};
 use super::trial::Converged;
 use crate::adjustment::{self, AdjustError, Adjustment, Method, Requests};
@@ -80,25 +80,26 @@ impl<'a> NetworkAdjustment<'a> {
             let mut assembled =
                 network.assembled(options, &screening.leaving.left_out, reached, context.threads)?;
             if let Some(state) = start.take() {
-                assembled.go_on_from(state)?;
+                assembled.start_from(state)?;
             }
             datum.map_or(Ok(()), |inner| network.check_carriers(inner, &assembled))?;
             let done = before.as_ref().map_or(0, |(before, _)| before.iterations.len());
             let joint = self.keep.map(|points| assembled.taking_part(points));
             let ended = self.iterated(&assembled, joint.as_deref(), done, context);
             let reopened = ended.as_ref().ok().and_then(|ended| reopened(&assembled, ended));
-            let look = || screening.look(&Ended { adjusted: &ended, assembled: &assembled, options });
-            let begin = reopened.or_else(look);
+            let detect =
+                || screening.detect(&ScreenInput { adjusted: &ended, assembled: &assembled, options });
+            let begin = reopened.or_else(detect);
             match (begin, ended) {
-                (Some(Begin::FromStart), _) => before = None,
-                (Some(Begin::AsBefore), _) => {}
-                (Some(Begin::FromHere), Ok(mut ended)) => {
-                    ended.go_on_from(before.take().map(|(earlier, _)| earlier));
+                (Some(Restart::FromStart), _) => before = None,
+                (Some(Restart::AsBefore), _) => {}
+                (Some(Restart::FromHere), Ok(mut ended)) => {
+                    ended.prepend(before.take().map(|(earlier, _)| earlier));
                     let reached = assembled.reached(&ended.unknowns, network.points.len());
                     before = Some((ended, reached));
                 }
                 (None, Ok(mut ended)) => {
-                    ended.go_on_from(before.map(|(earlier, _)| earlier));
+                    ended.prepend(before.map(|(earlier, _)| earlier));
                     return self.solved(joint, assembled, ended, screening, context);
                 }
                 (_, Err(error)) => {
@@ -207,8 +208,8 @@ impl Network {
 }
 
 /// Returns a restart if images have moved beyond the active knots of their lens spline.
-fn reopened(assembled: &Assembled, ended: &Adjustment) -> Option<Begin> {
-    (assembled.problem.model.beyond_windows(&ended.unknowns) > 0).then_some(Begin::FromHere)
+fn reopened(assembled: &Assembled, ended: &Adjustment) -> Option<Restart> {
+    (assembled.problem.model.images_beyond_knots(&ended.unknowns) > 0).then_some(Restart::FromHere)
 }
 
 /// Transforms an adjusted network to the datum of inner constraints; returns the relative rounding error of its variances.

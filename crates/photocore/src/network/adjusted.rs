@@ -6,10 +6,10 @@ use nalgebra::DMatrix;
 
 use super::commons::Common;
 use super::input::{Camera, Network, Point};
+use super::linearization_point::LinearizationPoint;
 use super::model::Bundle;
 use super::neighbourhood::TOGETHER;
 use super::problem::Assembled;
-use super::stations::Stations;
 use crate::adjustment::{Adjustment, Problem};
 use crate::geometry::{AttitudeNumbers, Matrix3, POSE, PoseNumbers};
 use crate::normals::Cofactors;
@@ -58,7 +58,7 @@ pub(super) fn adjusted_photos(
     let model = &problem.model;
     let origin = model.origin;
     let positions = if let PoseNumbers::Angles(_) = network.poses { 3 } else { 0 };
-    let stations = model.without_points(&unknowns[model.of_stations()]);
+    let linearization = model.without_points(&unknowns[model.parameter_unknowns()]);
     let photo = |index: usize| {
         let photo = &network.photos[index];
         let range = model.of_photo(index);
@@ -84,7 +84,7 @@ pub(super) fn adjusted_photos(
             // In a node of a larger network, its images may belong to child nodes.
             let asked = model.images_on[index] > 0 || !problem.layout().contributions().is_empty();
             let cofactors = adjustment.cofactors.as_ref().filter(|_| asked);
-            let (pose, cofactors) = mounted_pose(network, problem, &stations, index, cofactors);
+            let (pose, cofactors) = mounted_pose(network, problem, &linearization, index, cofactors);
             let redundancy = vec![if cofactors[0].is_nan() { f64::NAN } else { 0.0 }; POSE];
             return AdjustedPhoto { pose, camera, cofactors, redundancy, images: model.images_on[index] };
         }
@@ -111,7 +111,7 @@ pub(super) fn adjusted_photos(
 fn mounted_pose(
     network: &Network,
     problem: &Problem<Bundle>,
-    Stations { photos, mounted, .. }: &Stations,
+    LinearizationPoint { photos, mounted, .. }: &LinearizationPoint,
     photo: usize,
     cofactors: Option<&Cofactors>,
 ) -> ([f64; POSE], DMatrix<f64>) {
@@ -130,7 +130,7 @@ fn mounted_pose(
 
 /// Returns the angles of a photo that steps by a rotation vector; at a singular attitude kappa is zero and omega is the sum.
 fn reported_angles(model: &Bundle, photo: usize, values: &[f64]) -> Option<[f64; 3]> {
-    let numbers = AttitudeNumbers::OmegaPhiKappa(model.turning_sense(photo)?);
+    let numbers = AttitudeNumbers::OmegaPhiKappa(model.rotation_vector_sense(photo)?);
     let angles = [values[3], values[4], values[5]];
     Some(if numbers.is_singular(angles) { numbers.numbers(&numbers.attitude(angles)) } else { angles })
 }
@@ -138,7 +138,7 @@ fn reported_angles(model: &Bundle, photo: usize, values: &[f64]) -> Option<[f64;
 /// Converts cofactors of a photo to its angles by diag(I, K^-1, I) if its attitude steps by a rotation vector rho = K d(angles). NaN for
 /// undetermined angles, if phi is 90 degrees.
 fn in_angles(model: &Bundle, photo: usize, values: &[f64], mut found: DMatrix<f64>) -> DMatrix<f64> {
-    let Some(sense) = model.turning_sense(photo) else { return found };
+    let Some(sense) = model.rotation_vector_sense(photo) else { return found };
     let (numbers, angles) = (AttitudeNumbers::OmegaPhiKappa(sense), [values[3], values[4], values[5]]);
     let inverse = numbers.by_step(angles).unwrap_or_else(|| Matrix3::repeat(f64::NAN));
     let rows = inverse * found.fixed_rows::<3>(3);
@@ -170,7 +170,7 @@ pub(super) fn adjusted_points(
         });
         let found =
             || own.map_or_else(|| Matrix3::repeat(f64::NAN), |own| Matrix3::from_row_slice(&own[..9]));
-        let shifted = model.shifted(i, &unknowns[model.of_stations()], cofactors);
+        let shifted = model.shifted(i, &unknowns[model.parameter_unknowns()], cofactors);
         let (coordinates, cofactors) = match shifted {
             Some((place, cofactors)) => (std::array::from_fn(|k| place[k] + origin[k]), cofactors),
             None => (std::array::from_fn(absolute), found()),
@@ -232,7 +232,7 @@ impl Network {
         unknowns: &[f64],
     ) -> Vec<AdjustedCommon> {
         let model = &problem.model;
-        let states = model.common_states(&unknowns[model.of_stations()]);
+        let states = model.common_states(&unknowns[model.parameter_unknowns()]);
         let each = |(index, common): (usize, &Common)| {
             let (width, state) = (common.sd.len(), &states[index]);
             let missing = if adjustment.cofactors.is_some() && common.is_held() { 0.0 } else { f64::NAN };

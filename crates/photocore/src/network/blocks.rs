@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use super::commons::{Common, InBlock};
 use super::input::{Network, Photo};
+use super::interface::{BlockId, Interface};
 use super::mounts::Trajectory;
-use super::surroundings::{BlockOf, Surroundings};
 use crate::geometry::POSE;
 
 /// Retained blocks, except points: photos (pose, own camera, own film parameters), then shared cameras, then shared parameters. The pose of
@@ -96,10 +96,11 @@ impl Network {
         }
         let mut of_photo = vec![];
         let mut placed: Vec<bool> = self.commons.iter().map(Common::is_held).collect();
-        for (passages, together) in self.passed_together(elsewhere) {
+        for (image_corrections, together) in self.commons_of_corrections(elsewhere) {
             // The block of an image with a mount is its frame or trajectory.
-            let photo = self.passages[passages[0]].photo().filter(|_| self.mounts.is_empty());
-            if let (Some(photo), [_]) = (photo, &*passages) {
+            let photo =
+                self.image_corrections[image_corrections[0]].photo().filter(|_| self.mounts.is_empty());
+            if let (Some(photo), [_]) = (photo, &*image_corrections) {
                 together.iter().for_each(|&common| placed[common] = true);
                 of_photo.resize(self.photos.len(), vec![]);
                 of_photo[photo] = together;
@@ -116,11 +117,11 @@ impl Network {
 
     /// Returns the free shared parameters that all images of a correction depend on, grouped by equal lists of corrections. Parameters that
     /// are used elsewhere are excluded.
-    fn passed_together(&self, elsewhere: &BTreeSet<usize>) -> BTreeMap<Vec<usize>, Vec<usize>> {
+    fn commons_of_corrections(&self, elsewhere: &BTreeSet<usize>) -> BTreeMap<Vec<usize>, Vec<usize>> {
         let mut having = vec![vec![]; self.commons.len()];
         let mut everywhere: Vec<bool> =
             (0..self.commons.len()).map(|own| !elsewhere.contains(&own)).collect();
-        for (passage, own) in self.passages.iter().enumerate() {
+        for (passage, own) in self.image_corrections.iter().enumerate() {
             let all = own.everywhere();
             for (common, _) in own.unknowns() {
                 having[common].push(passage);
@@ -128,9 +129,9 @@ impl Network {
             }
         }
         let mut found: BTreeMap<Vec<usize>, Vec<usize>> = BTreeMap::new();
-        for (common, passages) in having.into_iter().enumerate() {
-            if !passages.is_empty() && everywhere[common] && !self.commons[common].is_held() {
-                found.entry(passages).or_default().push(common);
+        for (common, image_corrections) in having.into_iter().enumerate() {
+            if !image_corrections.is_empty() && everywhere[common] && !self.commons[common].is_held() {
+                found.entry(image_corrections).or_default().push(common);
             }
         }
         found
@@ -139,12 +140,12 @@ impl Network {
 
 impl Network {
     /// Returns the free cameras of several photos (here or in other nodes) or of a mounted photo, ascending.
-    pub(super) fn shared_cameras(&self, surroundings: &Surroundings) -> Vec<usize> {
+    pub(super) fn shared_cameras(&self, interface: &Interface) -> Vec<usize> {
         let mut photos = vec![0; self.cameras.len()];
         self.photos.iter().for_each(|photo| photos[photo.camera] += 1);
         // The block of a mounted photo cannot contain camera parameters.
         self.mounts.iter().for_each(|mount| photos[self.photos[mount.photo()].camera] += 1);
-        surroundings.indices(BlockOf::Camera).into_iter().for_each(|camera| photos[camera] += 2);
+        interface.indices(BlockId::Camera).into_iter().for_each(|camera| photos[camera] += 2);
         (0..photos.len()).filter(|&camera| photos[camera] > 1 && !self.cameras[camera].is_held()).collect()
     }
 }

@@ -4,16 +4,16 @@ use std::sync::OnceLock;
 
 use super::blocks::Blocks;
 use super::camera_priors::CameraPrior;
-use super::commons::PlacedCommon;
+use super::commons::CartesianCommon;
 use super::error::NetworkError;
+use super::image_corrections::ImageCorrections;
 use super::input::{Camera, Image, Network, Photo, Point, Screens};
+use super::interface::BlockId;
 use super::model::{Bundle, GivenDatum};
 use super::mounts::{AT_PHOTO, Mounts};
 use super::neighbourhood::TOGETHER;
 use super::observations::{Fault, Observation, TiedObservation, Touches};
-use super::passages::Passages;
 use super::selection::Selected;
-use super::surroundings::BlockOf;
 use crate::geometry::{Matrix3, ObjectSpace, POSE, PoseNumbers, Refraction, local_vertical};
 use crate::parallel;
 
@@ -47,16 +47,16 @@ impl Network {
             cameras: self.photos.iter().map(|photo| self.camera(photo).camera.clone()).collect(),
             blocks: Blocks::new(
                 self,
-                self.shared_cameras(&selected.surroundings),
-                &selected.surroundings.indices(BlockOf::Common),
+                self.shared_cameras(&selected.interface),
+                &selected.interface.indices(BlockId::Common),
             ),
             camera_priors: vec![],
-            commons: self.placed_commons(selected, &mounts, (&images, &image_times), middle),
+            commons: self.cartesian_commons(selected, &mounts, (&images, &image_times), middle),
             datum: self.given_datum(selected, &mounts),
             mounts,
             image_times,
-            passages: Passages::new(
-                &self.passages,
+            image_corrections: ImageCorrections::new(
+                &self.image_corrections,
                 (&selected.points, self.points.len()),
                 self.photos.iter().map(|photo| photo.camera),
             ),
@@ -77,7 +77,7 @@ impl Network {
             CameraPrior::of(camera, self.first_parameter(&bundle, index)?)
         };
         bundle.camera_priors = self.cameras.iter().enumerate().filter_map(prior).collect();
-        bundle.find_cells();
+        bundle.assign_cells();
         bundle.observations = self.tied_observations(selected, &bundle)?;
         Ok(bundle)
     }
@@ -88,16 +88,16 @@ impl Network {
     }
 
     /// Returns the shared parameters, each with the number of dependent active observations and images.
-    fn placed_commons(
+    fn cartesian_commons(
         &self,
         selected: &Selected,
         mounts: &Mounts,
         (images, times): (&[Image], &[f64]),
         middle: [f64; 3],
-    ) -> Vec<PlacedCommon> {
+    ) -> Vec<CartesianCommon> {
         let (origin, vertical) = (self.origin(middle), self.vertical(middle));
-        let place = |common| PlacedCommon::new(common, self.space, origin, &vertical);
-        let mut placed: Vec<PlacedCommon> = self.commons.iter().map(place).collect();
+        let place = |common| CartesianCommon::new(common, self.space, origin, &vertical);
+        let mut placed: Vec<CartesianCommon> = self.commons.iter().map(place).collect();
         let time = |image: usize| times.get(image).copied().unwrap_or(AT_PHOTO);
         let of_image = |(image, own): (usize, &Image)| mounts.commons(own.photo, time(image));
         images.iter().enumerate().flat_map(of_image).for_each(|common| placed[common].uses += 1);

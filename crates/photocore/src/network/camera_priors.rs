@@ -30,10 +30,10 @@ impl CameraPrior {
         let count = self.root.nrows();
         // Values without prior information may be arbitrary: their column is zero.
         let weighted = |k: usize| self.root.column(k).iter().any(|&value| value != 0.0);
-        let apart = DVector::from_fn(count, |k, _| {
+        let difference = DVector::from_fn(count, |k, _| {
             if weighted(k) { prior[self.first + k] - values[self.first + k] } else { 0.0 }
         });
-        terms.push(self.first, (&self.root * apart).as_slice(), self.root.transpose().as_slice());
+        terms.push(self.first, (&self.root * difference).as_slice(), self.root.transpose().as_slice());
     }
 }
 

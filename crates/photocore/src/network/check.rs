@@ -4,10 +4,10 @@ use std::mem::discriminant;
 
 use super::commons::CommonKind;
 use super::error::NetworkError;
+use super::image_corrections::{ImageCorrection, Requirements};
 use super::input::{Image, Network};
 use super::mounts::{AT_PHOTO, Mount, Mounts, Trajectory};
 use super::observations::{Fault, Observation};
-use super::passages::{Passage, Requirements};
 use crate::geometry::{ObjectSpace, PoseNumbers};
 
 impl Network {
@@ -50,7 +50,7 @@ impl Network {
                 .and_then(|()| check_motion(observation, &flies));
             checked.map_err(|fault| NetworkError::Observation { index, kind: observation.kind(), fault })?;
         }
-        self.check_passages()?;
+        self.check_image_corrections()?;
         let cartesian = self.space == ObjectSpace::Rectangular && self.refraction.is_none();
         if self.poses == PoseNumbers::Vectors && !cartesian { Err(NetworkError::Vectors) } else { Ok(()) }
     }
@@ -116,11 +116,11 @@ impl Network {
     }
 
     /// Returns an error for image corrections that do not fit the network.
-    fn check_passages(&self) -> Result<(), NetworkError> {
+    fn check_image_corrections(&self) -> Result<(), NetworkError> {
         let of_type = |(common, kind): (usize, CommonKind)| {
             self.commons.get(common).is_some_and(|own| own.kind == kind)
         };
-        if self.passages.is_empty() {
+        if self.image_corrections.is_empty() {
             return Ok(());
         }
         let mut given: Vec<bool> = self.points.iter().map(|point| point.sd == [0.0; 3]).collect();
@@ -129,8 +129,11 @@ impl Network {
         let cameras = self.cameras.iter().map(|own| &own.camera).collect();
         let photos = self.photos.iter().map(|own| own.camera).collect();
         let required = Requirements { space: self.space, given, cameras, photos };
-        let bad = |own: &Passage| !own.unknowns().into_iter().all(of_type) || !own.is_of(&required);
-        self.passages.iter().position(bad).map_or(Ok(()), |index| Err(NetworkError::Passage(index)))
+        let bad = |own: &ImageCorrection| !own.unknowns().into_iter().all(of_type) || !own.is_of(&required);
+        self.image_corrections
+            .iter()
+            .position(bad)
+            .map_or(Ok(()), |index| Err(NetworkError::ImageCorrection(index)))
     }
 
     /// Returns an error for times of photos and images outside their trajectory.

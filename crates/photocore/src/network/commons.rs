@@ -217,7 +217,7 @@ impl Common {
 
 /// A shared parameter in the Cartesian axes of an adjustment.
 #[derive(Debug, Clone)]
-pub(super) struct PlacedCommon {
+pub(super) struct CartesianCommon {
     pub kind: CommonKind,
     space: ObjectSpace,
     origin: [f64; 3],
@@ -240,7 +240,7 @@ pub(super) struct SimilarityMotion<'a> {
     pub scale: f64,
 }
 
-impl PlacedCommon {
+impl CartesianCommon {
     /// Converts a shared parameter. Rows of `vertical` are the local axes at the centre of the photos, X, Y, Z in rectangular space.
     pub fn new(common: &Common, space: ObjectSpace, origin: [f64; 3], vertical: &Matrix3) -> Self {
         let Common { kind, position, attitude, .. } = common;

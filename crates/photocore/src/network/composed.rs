@@ -6,9 +6,9 @@ use nalgebra::{DMatrix, Matrix6, Matrix6xX};
 use smallvec::{SmallVec, smallvec};
 
 use super::commons::{CommonState, InBlock};
+use super::linearization_point::{LinearizationPoint, Mounted, PhotoState};
 use super::model::Bundle;
-use super::mounts::{AT_PHOTO, Composed, Grounds, Moving};
-use super::stations::{Mounted, Station, Stations};
+use super::mounts::{AT_PHOTO, Composed, PhotoMotion, PoseInputs};
 use crate::geometry::{Orientation, POSE, Vector3};
 use crate::normals::{Cofactors, Layout};
 
@@ -43,15 +43,15 @@ impl Bundle {
         self.mounts.main_block(photo, &|common| self.blocks.of_common[common])
     }
 
-    fn grounds<'a>(
+    fn pose_inputs<'a>(
         &'a self,
         photo: &'a dyn Fn(usize) -> Orientation,
         common: &'a dyn Fn(usize) -> (Cow<'a, CommonState>, Option<InBlock>),
-    ) -> Grounds<'a> {
-        Grounds { space: self.space, mounts: &self.mounts, photo, common }
+    ) -> PoseInputs<'a> {
+        PoseInputs { space: self.space, mounts: &self.mounts, photo, common }
     }
 
-    /// Returns the pose of a mounted photo; None for others. `unknowns` contains the parameters of [`Bundle::of_stations`].
+    /// Returns the pose of a mounted photo; None for others. `unknowns` contains the parameters of [`Bundle::parameter_unknowns`].
     pub(super) fn composed(&self, photo: usize, unknowns: &[f64]) -> Option<Composed> {
         let own = |photo: usize| {
             let pose = &unknowns[self.blocks.first[photo]..][..POSE];
@@ -59,11 +59,11 @@ impl Bundle {
         };
         let common =
             |common: usize| (Cow::Owned(self.common_state(common, unknowns)), self.blocks.of_common[common]);
-        self.grounds(&own, &common).composed(photo, AT_PHOTO)
+        self.pose_inputs(&own, &common).composed(photo, AT_PHOTO)
     }
 
     /// Composes the poses of all mounted photos and stores them in replaced photos; None without mounts.
-    pub(super) fn mount_all(&self, photos: &mut [Station], commons: &[CommonState]) -> Option<Mounted> {
+    pub(super) fn mount_all(&self, photos: &mut [PhotoState], commons: &[CommonState]) -> Option<Mounted> {
         if self.mounts.is_empty() {
             return None;
         }
@@ -71,8 +71,8 @@ impl Bundle {
         let composed = {
             let photo = |photo: usize| own[photo];
             let common = |common: usize| (Cow::Borrowed(&commons[common]), self.blocks.of_common[common]);
-            let grounds = self.grounds(&photo, &common);
-            (0..own.len()).map(|photo| grounds.composed(photo, AT_PHOTO)).collect::<Vec<_>>()
+            let pose_inputs = self.pose_inputs(&photo, &common);
+            (0..own.len()).map(|photo| pose_inputs.composed(photo, AT_PHOTO)).collect::<Vec<_>>()
         };
         for (photo, composed) in composed.iter().enumerate().filter(|&(photo, _)| self.is_carried(photo)) {
             composed.iter().for_each(|composed| photos[photo].orientation = composed.orientation);
@@ -82,15 +82,29 @@ impl Bundle {
 
     /// Returns the point of an image with corrections, in the axes of its photo.
     #[inline(never)]
-    pub(super) fn sight_bent(&self, stations: &Stations, group: usize, local: usize) -> Vector3 {
+    pub(super) fn corrected_sight(
+        &self,
+        linearization: &LinearizationPoint,
+        group: usize,
+        local: usize,
+    ) -> Vector3 {
         let mut own = Composed::new(false);
-        let timed = self.compose_timed(stations, group, &mut own);
+        let timed = self.compose_timed(linearization, group, &mut own);
         let (timed, photo) = (timed.then_some(&own.orientation), self.images[group].photo);
-        stations.seen(self.space, timed, photo, local, |orientation, point| orientation.sight(point))
+        linearization
+            .seen(self.space, timed, photo, local, |orientation, point| orientation.to_camera_frame(point))
     }
 
-    pub(super) fn compose_timed(&self, stations: &Stations, image: usize, own: &mut Composed) -> bool {
-        stations.mounted.as_ref().is_some_and(|mounted| self.compose(mounted, &stations.commons, image, own))
+    pub(super) fn compose_timed(
+        &self,
+        linearization: &LinearizationPoint,
+        image: usize,
+        own: &mut Composed,
+    ) -> bool {
+        linearization
+            .mounted
+            .as_ref()
+            .is_some_and(|mounted| self.compose(mounted, &linearization.commons, image, own))
     }
 
     /// Composes the individual pose of an image into existing storage; returns false if it shares the pose of its photo.
@@ -104,13 +118,18 @@ impl Bundle {
         let of = self.images[image].photo;
         let photo = |photo: usize| mounted.own[photo];
         let common = |common: usize| (Cow::Borrowed(&commons[common]), self.blocks.of_common[common]);
-        self.mounts.are_timed(of) && self.grounds(&photo, &common).compose(of, self.time_of(image), own)
+        self.mounts.are_timed(of) && self.pose_inputs(&photo, &common).compose(of, self.time_of(image), own)
     }
 
-    pub(super) fn moving(&self, mounted: &Mounted, commons: &[CommonState], photo: usize) -> Option<Moving> {
+    pub(super) fn moving(
+        &self,
+        mounted: &Mounted,
+        commons: &[CommonState],
+        photo: usize,
+    ) -> Option<PhotoMotion> {
         let own = |photo: usize| mounted.own[photo];
         let common = |common: usize| (Cow::Borrowed(&commons[common]), self.blocks.of_common[common]);
-        self.grounds(&own, &common).moving(photo, AT_PHOTO)
+        self.pose_inputs(&own, &common).moving(photo, AT_PHOTO)
     }
 
     /// Returns the six reported pose parameters, relative to the origin, and their partials by its own parameters; None at singular angles.

@@ -160,7 +160,7 @@ impl Network {
         let mut of_ties = vec![0; model.tied_images()];
         of_ties.extend(model.observations.iter().map(|tied| class_of(tied.observation.kind())));
         let mut of_unknowns = vec![1; assembled.problem.layout().unknowns()];
-        for (owner, unknowns) in (0..model.stations()).flat_map(|block| model.owners(block)) {
+        for (owner, unknowns) in (0..model.parameter_blocks()).flat_map(|block| model.owners(block)) {
             of_unknowns[unknowns].fill(match owner {
                 Owner::Photo(_) => 2,
                 Owner::Camera(_) => 3,
@@ -380,7 +380,7 @@ impl Covariances {
     /// Returns the pose of a mounted photo, as functions of the parameters of all its blocks.
     fn mounted(&self, photo: usize, step: bool) -> Vec<Function> {
         let model = &self.assembled.problem.model;
-        let unknowns = &self.linearized.values()[model.of_stations()];
+        let unknowns = &self.linearized.values()[model.parameter_unknowns()];
         let Some(composed) = model.composed(photo, unknowns) else { return vec![] };
         let reported =
             || model.reported(&composed.orientation).1.unwrap_or_else(|| Matrix6::repeat(f64::NAN));
@@ -403,7 +403,7 @@ impl Covariances {
         let PoseNumbers::Angles(sense) = model.poses else { return Matrix3::identity() };
         let pose = &self.linearized.values()[model.of_block(photo)];
         let (numbers, angles) = (AttitudeNumbers::OmegaPhiKappa(sense), [pose[3], pose[4], pose[5]]);
-        match (model.turning_sense(photo).is_some(), step) {
+        match (model.rotation_vector_sense(photo).is_some(), step) {
             (true, true) | (false, false) => Matrix3::identity(),
             (false, true) => numbers.rates(angles),
             (true, false) => numbers.by_step(angles).unwrap_or_else(|| Matrix3::repeat(f64::NAN)),

@@ -66,14 +66,14 @@ impl Assembled {
     /// Returns true if the attitude of a photo, or of its frame, steps by a rotation about its own axes.
     pub(super) fn turns(&self, photo: usize) -> bool {
         let model = &self.problem.model;
-        photo >= model.cameras.len() || model.turning_sense(model.carrier(photo)).is_some()
+        photo >= model.cameras.len() || model.rotation_vector_sense(model.carrier(photo)).is_some()
     }
 
     /// Returns the root mean square distance of all points and photos from their centre, at the initial values.
     fn radius(&self) -> f64 {
         let (model, unknowns) = (&self.problem.model, &self.problem.initial);
         let points = model.coordinates(unknowns).map(|&at| model.space.cartesian(at));
-        let photos = model.photos(&unknowns[model.of_stations()]);
+        let photos = model.photos(&unknowns[model.parameter_unknowns()]);
         let places: Vec<Vector3> =
             points.chain(photos.iter().map(|station| station.orientation.centre())).collect();
         let count = places.len().max(1) as f64;

@@ -1,9 +1,9 @@
 //! Points that a step moves out of the network or to a station.
 
 use super::input::Image;
+use super::linearization_point::{LinearizationPoint, PhotoState};
 use super::model::Bundle;
 use super::selection::FEW;
-use super::stations::{Station, Stations};
 use crate::adjustment::median;
 
 /// Ratio of a point's share of the station's information to the mean of the others, above which it is at the station. The point is 10,000
@@ -52,7 +52,7 @@ impl Shares {
 
 impl Bundle {
     /// Returns points at a station or approaching it, to which their rays lead them.
-    pub fn run_into_stations(&self, before: &[f64], after: &Stations) -> Vec<usize> {
+    pub fn find_points_at_stations(&self, before: &[f64], after: &LinearizationPoint) -> Vec<usize> {
         let mut near = self.near_stations(after);
         if !near.is_empty() {
             let before = self.evaluated(before);
@@ -66,12 +66,12 @@ impl Bundle {
     ///
     /// The image of a point rotates by 1 / distance per displacement of point or station. Its share of the station's information, which the
     /// elimination of the point removes again, is the square of this.
-    fn near_stations(&self, stations: &Stations) -> Vec<NearPoint> {
+    fn near_stations(&self, linearization: &LinearizationPoint) -> Vec<NearPoint> {
         let share = |point: usize, image: &Image| {
-            let centre = stations.photos[image.photo].orientation.centre();
-            (stations.points[point].position() - centre).norm_squared().recip()
+            let centre = linearization.photos[image.photo].orientation.centre();
+            (linearization.points[point].position() - centre).norm_squared().recip()
         };
-        let mut shares = vec![Shares::default(); stations.photos.len()];
+        let mut shares = vec![Shares::default(); linearization.photos.len()];
         for point in 0..self.points.len() {
             self.images_of(point).iter().for_each(|image| shares[image.photo].add(share(point, image)));
         }
@@ -90,13 +90,18 @@ impl Bundle {
     }
 
     /// Returns true if, before and after the step, all other images of a point agree with the image of the station.
-    fn is_same_place(&self, near: &NearPoint, before: &Stations, after: &Stations) -> bool {
+    fn is_same_place(
+        &self,
+        near: &NearPoint,
+        before: &LinearizationPoint,
+        after: &LinearizationPoint,
+    ) -> bool {
         let is_same = |image: &Image| {
-            let images = [before, after].map(|stations| {
-                let station = stations.photos[near.photo].orientation.centre();
-                let Station { orientation, camera } = &stations.photos[image.photo];
-                [stations.points[near.point].position(), station]
-                    .map(|place| camera.image(&orientation.pose().sight(&place)))
+            let images = [before, after].map(|linearization| {
+                let station = linearization.photos[near.photo].orientation.centre();
+                let PhotoState { orientation, camera } = &linearization.photos[image.photo];
+                [linearization.points[near.point].position(), station]
+                    .map(|place| camera.image(&orientation.pose().to_camera_frame(&place)))
             });
             let [.., station] = images[1];
             let sd = after.sd_in_camera(image);
@@ -113,7 +118,7 @@ impl Bundle {
     ///
     /// Steps are changes of coordinates, so that a point at infinity is only a limit: the image residuals decrease with the reciprocal
     /// distance.
-    pub fn lead_nowhere(&self, before: &[f64], after: &Stations) -> Vec<usize> {
+    pub fn find_diverging_points(&self, before: &[f64], after: &LinearizationPoint) -> Vec<usize> {
         let squares: Vec<f64> = (0..self.locals).map(|point| self.nearest(point, after)).collect();
         let Some(middle) = median(squares.clone()) else { return vec![] };
         let is_far =
@@ -129,26 +134,26 @@ impl Bundle {
     }
 
     /// Returns the squared distance of a point from the nearest station that observes it.
-    fn nearest(&self, point: usize, stations: &Stations) -> f64 {
-        let place = stations.points[point].position();
+    fn nearest(&self, point: usize, linearization: &LinearizationPoint) -> f64 {
+        let place = linearization.points[point].position();
         let square =
-            |image: &Image| (place - stations.photos[image.photo].orientation.centre()).norm_squared();
+            |image: &Image| (place - linearization.photos[image.photo].orientation.centre()).norm_squared();
         self.images_of(point).iter().map(square).fold(f64::INFINITY, f64::min)
     }
 
     /// Returns true if a free point may as well be at infinity, on the ray of its first image.
-    fn is_at_infinity(&self, point: usize, stations: &Stations) -> bool {
+    fn is_at_infinity(&self, point: usize, linearization: &LinearizationPoint) -> bool {
         let images = self.images_of(point);
         let Some(first) = images.first().filter(|_| self.points[point].held() == [false; 3]) else {
             return false;
         };
-        let place = stations.points[point].position();
-        let station = stations.photos[first.photo].orientation.centre();
+        let place = linearization.points[point].position();
+        let station = linearization.photos[first.photo].orientation.centre();
         let places = [place, station + INFINITE * (place - station)];
         images.iter().all(|image| {
-            let Station { orientation, camera } = &stations.photos[image.photo];
-            let [here, there] = places.map(|place| camera.image(&orientation.pose().sight(&place)));
-            let sd = stations.sd_in_camera(image);
+            let PhotoState { orientation, camera } = &linearization.photos[image.photo];
+            let [here, there] = places.map(|place| camera.image(&orientation.pose().to_camera_frame(&place)));
+            let sd = linearization.sd_in_camera(image);
             (0..2).all(|k| (here[k] - there[k]).abs() < AT_INFINITY * sd[k])
         })
     }

@@ -2,10 +2,10 @@
 
 use thiserror::Error;
 
+use super::interface::BlockId;
 use super::observations::Fault;
-use super::surroundings::BlockOf;
 use crate::Stopped;
-use crate::adjustment::{CofactorError, DatumError, gib};
+use crate::adjustment::{CofactorError, DatumError, format_bytes};
 use crate::normals::LayoutError;
 
 /// Error of a network that cannot be adjusted or has undefined cofactors. Photos, cameras and points are indices into the network.
@@ -59,7 +59,7 @@ pub enum NetworkError {
     Mount(usize),
     /// A correction refers to missing parameters, points, photos or cameras, or to ones of a wrong type.
     #[error("passage {0} names unknowns, points, photos or cameras that are not there, or not of its kind")]
-    Passage(usize),
+    ImageCorrection(usize),
     /// A trajectory has invalid knots, or coefficients that do not match its basis.
     #[error(
         "trajectory {0} has knots that are none, or more or fewer coefficients than functions of its basis"
@@ -133,7 +133,7 @@ pub enum NetworkError {
     #[error(transparent)]
     Coarse(#[from] Coarse),
     /// The adjustment needs more memory than is available.
-    #[error("the adjustment takes {} of memory, and {} are free", gib(*.needed), gib(*.available))]
+    #[error("the adjustment takes {} of memory, and {} are free", format_bytes(*.needed), format_bytes(*.available))]
     Memory {
         /// Required bytes.
         needed: usize,
@@ -151,7 +151,7 @@ pub enum NetworkError {
     Datum(#[from] DatumError),
     /// An interface block of other nodes is missing or without free parameters.
     #[error("{0:?}, named for other nodes, is not there or has no unknowns of its own")]
-    NoBlock(BlockOf),
+    NoBlock(BlockId),
     /// Invalid input of a node of a larger network.
     #[error("{0}")]
     Node(&'static str),

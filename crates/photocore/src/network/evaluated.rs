@@ -1,9 +1,9 @@
 //! Implementation of the adjustment's model by the bundle, at given parameter values.
 
-use super::in_lanes::{FEWEST, Sight, write_in_lanes};
+use super::linearization_point::{LinearizationPoint, PhotoState, write};
 use super::model::{Bundle, MOTIONS};
 use super::mounts::Composed;
-use super::stations::{Station, Stations, write};
+use super::simd::{FEWEST, ImageObservation, linearize_simd};
 use crate::adjustment::{Evaluated, Model, Motions, Terms};
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::camera::{CameraModel, each_camera};
@@ -13,44 +13,55 @@ use crate::normals::GroupRows;
 /// A bundle at given parameter values.
 pub(super) struct At<'a> {
     pub bundle: &'a Bundle,
-    pub stations: Stations,
+    pub linearization: LinearizationPoint,
 }
 
 impl Bundle {
-    pub(super) fn observe(&self, stations: &Stations, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        if !stations.plain {
-            return self.observe_bent(stations, group, local, rows, &mut Composed::new(true));
+    pub(super) fn observe(
+        &self,
+        linearization: &LinearizationPoint,
+        local: usize,
+        group: usize,
+        rows: &mut GroupRows<'_>,
+    ) {
+        if !linearization.plain {
+            return self.write_corrected(linearization, group, local, rows, &mut Composed::new(true));
         }
         let image = &self.images[group];
-        let Station { orientation, camera } = &stations.photos[image.photo];
-        let point = &stations.points[local];
+        let PhotoState { orientation, camera } = &linearization.photos[image.photo];
+        let point = &linearization.points[local];
         each_camera!(camera, camera => write(orientation, camera, point, Some(image.xy), rows));
     }
 
-    pub(super) fn observe_tie(&self, stations: &Stations, tie: usize, rows: &mut GroupRows<'_>) {
+    pub(super) fn observe_tie(
+        &self,
+        linearization: &LinearizationPoint,
+        tie: usize,
+        rows: &mut GroupRows<'_>,
+    ) {
         let Some(observation) = tie.checked_sub(self.tied_images()) else {
-            return self.observe_tied_image(stations, self.point_images.start[self.locals] + tie, rows);
+            return self.observe_tied_image(linearization, self.point_images.start[self.locals] + tie, rows);
         };
         let own = &self.observations[observation];
         let first_linear = self.observations.len() - self.linear.len();
         if let Some(linear) = observation.checked_sub(first_linear) {
-            return self.linear[linear].write(&stations.coordinates, rows);
+            return self.linear[linear].write(&linearization.coordinates, rows);
         }
         let coefficients = if rows.local.is_empty() { &mut *rows.shared } else { &mut *rows.local };
-        self.with_tied(stations, |model| own.write(model, rows.constant, coefficients));
+        self.with_tied(linearization, |model| own.write(model, rows.constant, coefficients));
     }
 }
 
 impl Model for Bundle {
     fn at<'a>(&'a self, unknowns: &[f64]) -> Box<dyn Evaluated + 'a> {
-        Box::new(At { bundle: self, stations: self.evaluated(unknowns) })
+        Box::new(At { bundle: self, linearization: self.evaluated(unknowns) })
     }
 
     /// Angles of photos that step by a rotation vector are updated through their rotation matrix.
     fn advance(&self, unknowns: &mut [f64], step: &[f64]) {
-        let start = self.of_stations().start + 3;
+        let start = self.parameter_unknowns().start + 3;
         let turn = |photo: usize| {
-            let (first, sense) = (start + self.blocks.first[photo], self.turning_sense(photo)?);
+            let (first, sense) = (start + self.blocks.first[photo], self.rotation_vector_sense(photo)?);
             let [angles, rho] = [&*unknowns, step].map(|values| std::array::from_fn(|k| values[first + k]));
             Some((first, sense.stepped(angles, &Vector3::from(rho))))
         };
@@ -62,9 +73,9 @@ impl Model for Bundle {
     /// Rotation vectors between attitudes satisfy A^T B = Exp(rho).
     fn step_between(&self, from: &[f64], to: &[f64]) -> Vec<f64> {
         let mut step: Vec<f64> = to.iter().zip(from).map(|(to, from)| to - from).collect();
-        let start = self.of_stations().start + 3;
+        let start = self.parameter_unknowns().start + 3;
         for photo in 0..self.cameras.len() {
-            let Some(sense) = self.turning_sense(photo) else { continue };
+            let Some(sense) = self.rotation_vector_sense(photo) else { continue };
             let first = start + self.blocks.first[photo];
             let attitude = |values: &[f64]| {
                 let angles = std::array::from_fn(|k| values[first + k]);
@@ -85,7 +96,7 @@ impl Model for Bundle {
 
     /// Intersects the points again.
     fn relocate(&self, unknowns: &mut [f64]) -> bool {
-        let photos = self.of_stations();
+        let photos = self.parameter_unknowns();
         let Ok(coordinates) = self.intersect(&self.without_points(&unknowns[photos.clone()])) else {
             return false;
         };
@@ -96,17 +107,17 @@ impl Model for Bundle {
     }
 
     /// Shared cameras are correlated with attitudes, positions and heights, which slows convergence.
-    fn ends_slowly(&self) -> bool {
+    fn converges_linearly(&self) -> bool {
         !self.blocks.shared.is_empty()
     }
 
     /// A common displacement of all knots is nearly a rotation of all photos.
-    fn steps_swing(&self) -> bool {
-        !self.passages.lenses().is_empty()
+    fn may_oscillate(&self) -> bool {
+        !self.image_corrections.lenses().is_empty()
     }
 
-    fn outgrown(&self, unknowns: &[f64]) -> usize {
-        self.beyond_windows(unknowns)
+    fn pattern_violations(&self, unknowns: &[f64]) -> usize {
+        self.images_beyond_knots(unknowns)
     }
 
     /// Straight rays are invariant to similarity transformations; frames may contain known lengths.
@@ -129,67 +140,73 @@ impl Model for Bundle {
 
 impl Evaluated for At<'_> {
     fn observe(&self, local: usize, group: usize, rows: &mut GroupRows<'_>) {
-        self.bundle.observe(&self.stations, local, group, rows);
+        self.bundle.observe(&self.linearization, local, group, rows);
     }
 
-    fn observe_alike(&self, locals: &[u32], groups: &[u32], sd: &[f64], rows: &mut GroupRows<'_>) -> bool {
-        let Self { bundle, stations } = self;
-        let sight = |t: usize| {
+    fn observe_batch(&self, locals: &[u32], groups: &[u32], sd: &[f64], rows: &mut GroupRows<'_>) -> bool {
+        let Self { bundle, linearization } = self;
+        let to_camera_frame = |t: usize| {
             let group = groups[t] as usize;
             let (image, sd) = (&bundle.images[group], [sd[2 * group], sd[2 * group + 1]]);
-            Sight { point: &stations.points[locals[t] as usize], image, sd }
+            ImageObservation { point: &linearization.points[locals[t] as usize], image, sd }
         };
-        if !stations.plain {
-            let together = bundle.observe_all_passing(stations, locals, groups, rows);
+        if !linearization.plain {
+            let together = bundle.write_corrected_batch(linearization, locals, groups, rows);
             let mut pose = Composed::new(true);
             for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
                 let mut own = rows.part(t, locals.len());
                 if !together {
                     let image = (group as usize, local as usize);
-                    bundle.observe_bent(stations, image.0, image.1, &mut own, &mut pose);
+                    bundle.write_corrected(linearization, image.0, image.1, &mut own, &mut pose);
                 }
                 own.weigh(&sd[2 * group as usize..][..2]);
             }
             return true;
         }
         // The main block of an image without mounts is its photo.
-        locals.len() >= FEWEST && {
-            let Station { orientation, camera } = &stations.photos[bundle.images[groups[0] as usize].photo];
-            each_camera!(camera, camera => write_in_lanes(orientation, camera, locals.len(), &sight, rows))
-        }
+        locals.len() >= FEWEST
+            && {
+                let PhotoState { orientation, camera } =
+                    &linearization.photos[bundle.images[groups[0] as usize].photo];
+                each_camera!(camera, camera => linearize_simd(orientation, camera, locals.len(), &to_camera_frame, rows))
+            }
     }
 
-    fn misclose(&self, local: usize, group: usize, constant: &mut [f64]) -> bool {
-        let Self { bundle, stations } = self;
+    fn write_misclosure(&self, local: usize, group: usize, constant: &mut [f64]) -> bool {
+        let Self { bundle, linearization } = self;
         let image = &bundle.images[group];
-        let Station { orientation, camera } = &stations.photos[image.photo];
-        let u = match stations.plain {
-            true => orientation.sight(&stations.points[local]),
-            false => bundle.sight_bent(stations, group, local),
+        let PhotoState { orientation, camera } = &linearization.photos[image.photo];
+        let u = match linearization.plain {
+            true => orientation.to_camera_frame(&linearization.points[local]),
+            false => bundle.corrected_sight(linearization, group, local),
         };
-        let missing = each_camera!(camera, camera => match stations.film(image.photo) {
+        let missing = each_camera!(camera, camera => match linearization.film(image.photo) {
             None => camera.compare(&u, image.xy).0,
-            Some(film) => film.missing(camera.image(&u), bundle.passages.cell(group), image.xy),
+            Some(film) => film.missing(camera.image(&u), bundle.image_corrections.cell(group), image.xy),
         });
         constant.copy_from_slice(&missing);
         true
     }
 
     fn observe_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
-        self.bundle.observe_tie(&self.stations, tie, rows);
+        self.bundle.observe_tie(&self.linearization, tie, rows);
     }
 
     fn collapsed(&self, before: &[f64]) -> Vec<usize> {
-        let Self { bundle, stations } = self;
-        if bundle.screens.ran_into_station { bundle.run_into_stations(before, stations) } else { vec![] }
+        let Self { bundle, linearization } = self;
+        if bundle.screens.ran_into_station {
+            bundle.find_points_at_stations(before, linearization)
+        } else {
+            vec![]
+        }
     }
 
-    fn run_off(&self, before: &[f64]) -> Vec<usize> {
-        let Self { bundle, stations } = self;
-        if bundle.screens.ran_off { bundle.lead_nowhere(before, stations) } else { vec![] }
+    fn diverging(&self, before: &[f64]) -> Vec<usize> {
+        let Self { bundle, linearization } = self;
+        if bundle.screens.ran_off { bundle.find_diverging_points(before, linearization) } else { vec![] }
     }
 
     fn carried(&self, tie: usize) -> Option<(usize, Vec<[f64; MOTIONS]>)> {
-        self.bundle.carried_by_motions(&self.stations, tie.checked_sub(self.bundle.tied_images())?)
+        self.bundle.carried_by_motions(&self.linearization, tie.checked_sub(self.bundle.tied_images())?)
     }
 }

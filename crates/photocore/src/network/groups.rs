@@ -113,7 +113,7 @@ impl Covariances {
                 of[first + unknown] = group;
             }
         }
-        for (owner, unknowns) in (0..model.stations()).flat_map(|block| model.owners(block)) {
+        for (owner, unknowns) in (0..model.parameter_blocks()).flat_map(|block| model.owners(block)) {
             let unknowns = unknowns.map(|unknown| first + unknown);
             match owner {
                 Owner::Photo(photo) => {

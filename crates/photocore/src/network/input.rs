@@ -4,9 +4,9 @@
 use nalgebra::DMatrix;
 
 use super::commons::Common;
+use super::image_corrections::ImageCorrection;
 use super::mounts::{Mount, Trajectory};
 use super::observations::Observation;
-use super::passages::Passage;
 use crate::adjustment;
 use crate::geometry::{self, ObjectSpace, POSE, PoseNumbers, Refraction};
 use crate::normals::Ordering;
@@ -133,7 +133,7 @@ pub struct Network {
     /// Number of each image on the time scale of its photo (see [`super::mounts::OnTrajectory`]); empty if all are zero.
     pub image_times: Vec<f64>,
     /// Corrections of images after the projection.
-    pub passages: Vec<Passage>,
+    pub image_corrections: Vec<ImageCorrection>,
 }
 
 impl Network {
@@ -242,7 +242,7 @@ pub struct State {
     /// Points excluded because they ran into a station or their rays do not determine them, ascending.
     pub collapsed: Vec<usize>,
     /// Photos excluded because their images do not determine them, ascending.
-    pub loose: Vec<usize>,
+    pub undetermined_photos: Vec<usize>,
     /// Elimination order.
     pub ordering: Ordering,
     /// Datum of a later transformation; None for the minimal datum or the datum of the observations.

@@ -1,8 +1,8 @@
 //! Intersection of points from the rays of given photos.
 
+use super::linearization_point::{LinearizationPoint, Mounted, PhotoState};
 use super::model::Bundle;
 use super::mounts::Composed;
-use super::stations::{Mounted, Station, Stations};
 use crate::adjustment::median;
 use crate::geometry::rotation::solve;
 use crate::geometry::{Matrix3, Point, Ray, Vector3};
@@ -23,7 +23,7 @@ impl Bundle {
     ///
     /// # Errors
     /// The index of a point without usable rays.
-    pub fn intersect(&self, placed: &Stations) -> Result<Vec<[f64; 3]>, usize> {
+    pub fn intersect(&self, placed: &LinearizationPoint) -> Result<Vec<[f64; 3]>, usize> {
         let met: Vec<Option<Vector3>> = parallel::by_parts(self.points.len(), TOGETHER, &|points| {
             let mut rays = Vec::new();
             let meeting = |point: usize| {
@@ -50,12 +50,12 @@ impl Bundle {
     }
 
     /// Returns the rays of a point, each from the pose of its image.
-    fn rays(&self, placed: &Stations, point: usize) -> impl Iterator<Item = Ray> {
-        let Stations { photos, commons, mounted, films, .. } = placed;
+    fn rays(&self, placed: &LinearizationPoint, point: usize) -> impl Iterator<Item = Ray> {
+        let LinearizationPoint { photos, commons, mounted, films, .. } = placed;
         let ray = move |image: usize| {
             let (own, photo) = (&self.images[image], &photos[self.images[image].photo]);
             let xy = match films.get(own.photo) {
-                Some(Some(film)) => film.place(own.xy, self.passages.cell(image))?,
+                Some(Some(film)) => film.place(own.xy, self.image_corrections.cell(image))?,
                 _ => own.xy,
             };
             let mut pose = Composed::new(false);
@@ -68,7 +68,7 @@ impl Bundle {
     }
 
     /// Returns the median distance of the intersected points from their first photos.
-    fn median_distance(&self, photos: &[Station], met: &[Option<Vector3>]) -> Option<f64> {
+    fn median_distance(&self, photos: &[PhotoState], met: &[Option<Vector3>]) -> Option<f64> {
         let distance = |(&first, met): (&usize, &Option<Vector3>)| {
             Some((met.as_ref()? - photos[self.images[first].photo].orientation.centre()).norm())
         };
@@ -77,7 +77,7 @@ impl Bundle {
 
     /// Sets the fixed and weighted components and computes the others by least squares of the distances from the rays. The problem is
     /// linear in rectangular space, and nearly linear in geographic space.
-    fn hold(&self, placed: &Stations, point: usize, start: [f64; 3]) -> [f64; 3] {
+    fn hold(&self, placed: &LinearizationPoint, point: usize, start: [f64; 3]) -> [f64; 3] {
         let (held, given) = (self.points[point].held(), self.points[point].coordinates);
         // One ray and two given components determine the third without an initial value.
         let unknown = if held.contains(&true) { 0.0 } else { f64::NAN };

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use super::error::NetworkError;
+use super::interface::{BlockId, Interface};
 use super::model::Bundle;
-use super::surroundings::{BlockOf, Surroundings};
 use crate::adjustment::median;
 use crate::normals::Layout;
 
@@ -15,14 +15,14 @@ pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, Ne
     let widths: Vec<usize> = widths.chain(vec![3; tied]).collect();
     let main_of = (0..groups).map(|image| model.main_block(image) as u32).collect();
     let mut layout = Layout::new(2, 3, &widths, model.point_images.start[..=model.locals].to_vec(), main_of)?;
-    if !(model.blocks.shared.is_empty() && model.mounts.is_empty() && model.passages.is_empty()) {
+    if !(model.blocks.shared.is_empty() && model.mounts.is_empty() && model.image_corrections.is_empty()) {
         let (mut shared_ptr, mut shared) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
         shared_ptr.push(0);
         let beside = |image| model.blocks_of_image(image).skip(1).map(|block| block as u32).collect();
-        let mut alike: Vec<Option<Vec<u32>>> = vec![None; model.cameras.len()];
+        let mut proportional: Vec<Option<Vec<u32>>> = vec![None; model.cameras.len()];
         for (index, image) in model.images[..groups].iter().enumerate() {
-            if model.pass_alike(image.photo) {
-                shared.extend_from_slice(alike[image.photo].get_or_insert_with(|| beside(index)));
+            if model.has_uniform_corrections(image.photo) {
+                shared.extend_from_slice(proportional[image.photo].get_or_insert_with(|| beside(index)));
             } else {
                 shared.extend(beside(index));
             }
@@ -33,7 +33,7 @@ pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, Ne
     Ok(layout.with_places(places)?.with_ties(model.ties())?.with_pairs(model.pairs())?)
 }
 
-impl Surroundings {
+impl Interface {
     /// Returns the distinct retained blocks of the outer parameters, and of the contribution of each child node. Several shared parameters
     /// may be in one block.
     ///
@@ -45,20 +45,20 @@ impl Surroundings {
         points: &[usize],
     ) -> Result<(Vec<u32>, Vec<Vec<u32>>), NetworkError> {
         let (photos, tied) = (model.cameras.len(), &points[model.locals..]);
-        let block = |&block: &BlockOf| {
+        let block = |&block: &BlockId| {
             let found = match block {
-                BlockOf::Photo(photo) => Some(photo),
-                BlockOf::Camera(camera) => {
+                BlockId::Photo(photo) => Some(photo),
+                BlockId::Camera(camera) => {
                     model.blocks.shared.binary_search(&camera).ok().map(|shared| photos + shared)
                 }
-                BlockOf::Common(common) => model.blocks.of_common[common].map(|own| own.block),
-                BlockOf::Point(point) => {
-                    tied.iter().position(|&own| own == point).map(|place| model.stations() + place)
+                BlockId::Common(common) => model.blocks.of_common[common].map(|own| own.block),
+                BlockId::Point(point) => {
+                    tied.iter().position(|&own| own == point).map(|place| model.parameter_blocks() + place)
                 }
             };
             found.map(|block| block as u32).ok_or(NetworkError::NoBlock(block))
         };
-        let blocks = |all: &Vec<BlockOf>| -> Result<Vec<u32>, NetworkError> {
+        let blocks = |all: &Vec<BlockId>| -> Result<Vec<u32>, NetworkError> {
             let mut seen = BTreeSet::new();
             let mut found = all.iter().map(block).collect::<Result<Vec<u32>, NetworkError>>()?;
             found.retain(|&block| seen.insert(block));
@@ -86,7 +86,7 @@ impl Bundle {
             self.mounts.always(photo).for_each(|common| of_commons[common].push(place));
         }
         self.mounts.places_of_coefficients().for_each(|(common, place)| of_commons[common].push(place));
-        for (common, photo) in self.passages.own() {
+        for (common, photo) in self.image_corrections.own() {
             of_commons[common].push(photos[photo]);
         }
         for touches in self.observations.iter().map(|tied| &tied.touches) {

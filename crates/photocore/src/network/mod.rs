@@ -15,12 +15,12 @@
 //! | results | `groups`, `covariance`, `solution`, `visibility`, `weak_points`, `adjusted` |
 //! | trials without some observations | `trial`, `test_groups` |
 //! | exclusion of points and photos | `screens` |
-//! | problem of least squares | `naming`, `datum`, `problem`, `layout`, `bundle`, `station_values` |
-//! | values and equations at given parameters | `evaluated`, `rigid_motions`, `diverging`, `passing`, `composed`, `in_lanes`, `precision`, `intersection`, `motions`, `weighted_angles` |
-//! | unknowns | `model`, `blocks`, `stations` |
+//! | problem of least squares | `naming`, `datum`, `problem`, `layout`, `bundle`, `parameter_values` |
+//! | values and equations at given parameters | `evaluated`, `rigid_motions`, `diverging`, `corrected_images`, `composed`, `simd`, `precision`, `intersection`, `motions`, `weighted_angles` |
+//! | unknowns | `model`, `blocks`, `linearization` |
 //! | selection of the input | `check`, `selection`, `neighbourhood` |
-//! | input and errors | `error`, `surroundings`, `camera_priors`, `input` |
-//! | types of observations and parameters | `passages`, `observations`, `mounts`, `film`, `commons` |
+//! | input and errors | `error`, `interface`, `camera_priors`, `input` |
+//! | types of observations and parameters | `image_corrections`, `observations`, `mounts`, `film`, `commons` |
 //!
 //! Two photos over four control points:
 //!
@@ -64,6 +64,7 @@ mod camera_priors;
 mod check;
 pub mod commons;
 mod composed;
+mod corrected_images;
 mod covariance;
 mod datum;
 mod diverging;
@@ -73,18 +74,19 @@ pub mod film;
 mod group_tests;
 mod groups;
 pub mod hypotheses;
-mod in_lanes;
+pub mod image_corrections;
 mod input;
+mod interface;
 mod intersection;
 mod layout;
+mod linearization_point;
 mod model;
 mod motions;
 pub mod mounts;
 mod naming;
 mod neighbourhood;
 pub mod observations;
-pub mod passages;
-mod passing;
+mod parameter_values;
 mod precision;
 mod predictions;
 mod problem;
@@ -92,11 +94,9 @@ mod responses;
 mod rigid_motions;
 mod screens;
 mod selection;
+mod simd;
 pub mod snooping;
 mod solution;
-mod station_values;
-mod stations;
-mod surroundings;
 mod test_groups;
 mod trial;
 mod visibility;
@@ -110,15 +110,16 @@ pub use covariance::{Covariances, Of};
 pub use error::{Coarse, Combination, NetworkError, PosePart};
 pub use group_tests::{TestOfGroup, TestOfRow, Tests};
 pub use groups::Groups;
+pub use image_corrections::ImageCorrection;
 pub use input::{
     Camera, Image, InnerConstraints, Minimum, Network, NetworkDatum, Options, Photo, Point, Screens, Start,
     State, UnitVariance,
 };
+pub use interface::{BlockId, Interface};
 #[doc(hidden)]
 pub use intersection::meet;
 pub use mounts::{Mount, Trajectory};
 pub use observations::{AdjustedObservation, KindSums, Observation, Precision};
-pub use passages::Passage;
 pub use predictions::ResidualBlock;
 #[doc(hidden)]
 pub use problem::Assembled;
@@ -126,8 +127,7 @@ pub use problem::Assembled;
 pub use selection::Selected;
 pub use selection::{Dropped, Reason};
 pub use solution::{DatumInForce, Joint, LEAST_REDUNDANCY, Solution, SumsByType, Weak};
-pub use surroundings::{BlockOf, Surroundings};
 pub use test_groups::{GroupId, TestGroups, TestKind};
 pub use trial::{Converged, Excluded, Outcome, Trial};
-pub use visibility::Unseen;
+pub use visibility::ImpossibleImages;
 pub use weak_points::WeakPoint;

@@ -7,15 +7,15 @@ use nalgebra::DMatrix;
 
 use super::blocks::Blocks;
 use super::camera_priors::CameraPrior;
-use super::commons::{CommonState, InBlock, PlacedCommon};
+use super::commons::{CartesianCommon, CommonState, InBlock};
+use super::image_corrections::ImageCorrections;
 use super::input::{Image, Minimum, Point, Screens};
+use super::linearization_point::{LinearizationPoint, PhotoState, Refracted};
 use super::mounts::{AT_PHOTO, Mounts};
 use super::neighbourhood::ByPoint;
 use super::observations::{
     CommonSite, LOCAL, Linear, PhotoSite, PointSite, TiedModel, TiedObservation, Touches,
 };
-use super::passages::Passages;
-use super::stations::{Refracted, Station, Stations};
 use crate::geometry::{
     self, AttitudeNumbers, Camera, ObjectSpace, Orientation, POSE, PoseNumbers, Refraction, RotationSense,
     Vector3, Vertical,
@@ -38,13 +38,13 @@ pub struct Bundle {
     pub blocks: Blocks,
     /// Observed camera parameters with a covariance matrix.
     pub camera_priors: Vec<CameraPrior>,
-    pub commons: Vec<PlacedCommon>,
+    pub commons: Vec<CartesianCommon>,
     /// Relations of photos to rig frames and trajectories.
     pub mounts: Mounts,
     /// Number of each image on the time scale of its photo; empty if all are zero.
     pub image_times: Vec<f64>,
     /// Corrections of images after the projection.
-    pub passages: Passages,
+    pub image_corrections: ImageCorrections,
     /// Origin of the coordinates.
     pub origin: [f64; 3],
     /// Points, local ones first; coordinates are relative to the origin.
@@ -122,13 +122,13 @@ impl Owner {
 
 impl Bundle {
     /// Returns the range of parameters of photos, shared cameras and shared parameters among all.
-    pub fn of_stations(&self) -> Range<usize> {
+    pub fn parameter_unknowns(&self) -> Range<usize> {
         let start = 3 * self.locals;
-        start..start + self.blocks.first[self.stations()]
+        start..start + self.blocks.first[self.parameter_blocks()]
     }
 
     /// Returns the number of blocks of photos, shared cameras and shared parameters: the first retained blocks.
-    pub fn stations(&self) -> usize {
+    pub fn parameter_blocks(&self) -> usize {
         self.blocks.first.len() - 1
     }
 
@@ -152,7 +152,7 @@ impl Bundle {
 
     /// Returns the range of coordinates of a point among all parameters.
     pub fn of_point(&self, point: usize) -> Range<usize> {
-        let start = if point < self.locals { 0 } else { self.of_stations().len() };
+        let start = if point < self.locals { 0 } else { self.parameter_unknowns().len() };
         start + 3 * point..start + 3 * point + 3
     }
 
@@ -164,7 +164,7 @@ impl Bundle {
 
     /// Returns the coordinates of local points, and of all others.
     pub fn all_coordinates<'a>(&self, unknowns: &'a [f64]) -> (&'a [[f64; 3]], &'a [[f64; 3]]) {
-        let photos = self.of_stations();
+        let photos = self.parameter_unknowns();
         (unknowns[..photos.start].as_chunks().0, unknowns[photos.end..].as_chunks().0)
     }
 
@@ -186,18 +186,18 @@ impl Bundle {
 
     /// Returns the retained block of a point; [`LOCAL`] for a local one.
     fn block_of_point(&self, point: usize) -> usize {
-        point.checked_sub(self.locals).map_or(LOCAL, |tied| self.stations() + tied)
+        point.checked_sub(self.locals).map_or(LOCAL, |tied| self.parameter_blocks() + tied)
     }
 
     /// Returns the number of parameters of a retained block.
     fn width(&self, block: usize) -> usize {
-        if block < self.stations() { self.of_block(block).len() } else { 3 }
+        if block < self.parameter_blocks() { self.of_block(block).len() } else { 3 }
     }
 
     /// Returns the retained blocks of an image: blocks of its pose (main block first), of its corrections, and its shared camera.
     pub fn blocks_of_image(&self, image: usize) -> impl Iterator<Item = usize> {
         let photo = self.images[image].photo;
-        let passed = self.blocks_of_passages(image);
+        let passed = self.blocks_of_image_corrections(image);
         self.blocks_of_pose(photo, self.time_of(image)).chain(passed).chain(self.blocks.of_camera[photo])
     }
 
@@ -235,15 +235,20 @@ impl Bundle {
     }
 
     /// Writes the equations of an image observation of a point that is not local.
-    pub(super) fn observe_tied_image(&self, stations: &Stations, image: usize, rows: &mut GroupRows<'_>) {
+    pub(super) fn observe_tied_image(
+        &self,
+        linearization: &LinearizationPoint,
+        image: usize,
+        rows: &mut GroupRows<'_>,
+    ) {
         let all = rows.shared.len() / 2;
         let width = self.of_block(self.main_block(image)).len();
         let shared = all - 3 - width;
         let (mut local, mut retained, mut common) = ([0.0; 6], vec![0.0; 2 * width], vec![0.0; 2 * shared]);
         let constant = &mut *rows.constant;
-        let mut apart =
+        let mut difference =
             GroupRows { constant, local: &mut local, retained: &mut retained, shared: &mut common };
-        self.observe(stations, self.point_of(image), image, &mut apart);
+        self.observe(linearization, self.point_of(image), image, &mut difference);
         for (row, together) in rows.shared.chunks_exact_mut(all).enumerate() {
             together[..3].copy_from_slice(&local[3 * row..][..3]);
             together[3..3 + width].copy_from_slice(&retained[width * row..][..width]);
@@ -252,27 +257,34 @@ impl Bundle {
     }
 
     /// Calls `take` with the model of additional observations at the linearization point.
-    pub(super) fn with_tied<T>(&self, stations: &Stations, take: impl FnOnce(&TiedModel<'_>) -> T) -> T {
+    pub(super) fn with_tied<T>(
+        &self,
+        linearization: &LinearizationPoint,
+        take: impl FnOnce(&TiedModel<'_>) -> T,
+    ) -> T {
         let point = |point: usize| PointSite {
-            point: stations.points[point],
-            coordinates: stations.coordinates[point],
+            point: linearization.points[point],
+            coordinates: linearization.coordinates[point],
             block: self.block_of_point(point),
         };
-        let mounted = stations.mounted.as_ref();
+        let mounted = linearization.mounted.as_ref();
         let photo = |photo: usize| match mounted.and_then(|mounted| mounted.of(photo)) {
-            None => {
-                PhotoSite { orientation: &stations.photos[photo].orientation, block: photo, made_of: None }
-            }
+            None => PhotoSite {
+                orientation: &linearization.photos[photo].orientation,
+                block: photo,
+                made_of: None,
+            },
             Some(own) => {
                 let block = self.main_block_of_pose(photo);
                 PhotoSite { orientation: &own.orientation, block, made_of: Some(own) }
             }
         };
         let common = |common: usize| CommonSite {
-            state: &stations.commons[common],
+            state: &linearization.commons[common],
             place: self.blocks.of_common[common],
         };
-        let moving = |photo: usize| self.moving(stations.mounted.as_ref()?, &stations.commons, photo);
+        let moving =
+            |photo: usize| self.moving(linearization.mounted.as_ref()?, &linearization.commons, photo);
         take(&TiedModel {
             space: self.space,
             origin: self.origin,
@@ -284,10 +296,10 @@ impl Bundle {
         })
     }
 
-    /// Returns photos and shared parameters, without points, at given values of the parameters of [`Bundle::of_stations`].
-    pub fn without_points(&self, unknowns: &[f64]) -> Stations {
+    /// Returns photos and shared parameters, without points, at given values of the parameters of [`Bundle::parameter_unknowns`].
+    pub fn without_points(&self, unknowns: &[f64]) -> LinearizationPoint {
         let commons = self.common_states(unknowns);
-        let lenses = self.passages.lenses().iter().map(|own| own.commons.iter());
+        let lenses = self.image_corrections.lenses().iter().map(|own| own.commons.iter());
         let knots: Vec<Arc<[[f64; 2]]>> =
             lenses.map(|own| own.map(|&knot| commons[knot].vector().xy().into()).collect()).collect();
         let photo = |photo: usize| {
@@ -298,14 +310,15 @@ impl Bundle {
                 .map(|block| self.blocks.first[block]..self.blocks.first[block + 1]);
             let (own, camera) = (&self.cameras[photo], shared.map_or(camera, |range| &unknowns[range]));
             let camera = own.with_parameters(camera).unwrap_or_else(|| own.clone());
-            let lens = self.passages.lens(photo).and_then(|lens| camera.with_knots(knots[lens].clone()));
-            Station { orientation: self.orientation(photo, &pose), camera: lens.unwrap_or(camera) }
+            let lens =
+                self.image_corrections.lens(photo).and_then(|lens| camera.with_knots(knots[lens].clone()));
+            PhotoState { orientation: self.orientation(photo, &pose), camera: lens.unwrap_or(camera) }
         };
-        let mut photos: Vec<Station> = (0..self.cameras.len()).map(photo).collect();
+        let mut photos: Vec<PhotoState> = (0..self.cameras.len()).map(photo).collect();
         let mounted = self.mount_all(&mut photos, &commons);
-        let films = self.passages.films(&commons);
-        let plain = self.refraction.is_none() && mounted.is_none() && self.passages.is_empty();
-        Stations {
+        let films = self.image_corrections.films(&commons);
+        let plain = self.refraction.is_none() && mounted.is_none() && self.image_corrections.is_empty();
+        LinearizationPoint {
             photos,
             commons,
             mounted,
@@ -317,7 +330,7 @@ impl Bundle {
         }
     }
 
-    pub fn photos(&self, unknowns: &[f64]) -> Vec<Station> {
+    pub fn photos(&self, unknowns: &[f64]) -> Vec<PhotoState> {
         self.without_points(unknowns).photos
     }
 
@@ -352,7 +365,7 @@ impl Bundle {
 
     /// Returns the owner of one of these parameters and its number there; None for points.
     pub fn owner(&self, unknown: usize) -> Option<(Owner, usize)> {
-        let all = self.of_stations();
+        let all = self.parameter_unknowns();
         let retained = all.contains(&unknown).then(|| unknown - all.start)?;
         let block = self.blocks.first.partition_point(|&start| start <= retained) - 1;
         let own = self.owners(block).into_iter().find(|(_, range)| range.contains(&unknown));
@@ -389,7 +402,7 @@ impl Bundle {
     /// Returns the orientation of a photo at a given pose, with the partials by its parameters.
     pub fn orientation(&self, photo: usize, pose: &[f64; POSE]) -> Orientation {
         let [x, y, z, omega, phi, kappa] = *pose;
-        match self.turning_sense(photo) {
+        match self.rotation_vector_sense(photo) {
             Some(sense) => {
                 let local = AttitudeNumbers::OmegaPhiKappa(sense).attitude([omega, phi, kappa]);
                 Orientation::stepping(self.space, [x, y, z], &local)
@@ -398,14 +411,14 @@ impl Bundle {
         }
     }
 
-    /// Returns the verticals at the photos; `unknowns` contains the parameters of [`Bundle::of_stations`].
+    /// Returns the verticals at the photos; `unknowns` contains the parameters of [`Bundle::parameter_unknowns`].
     fn verticals_at_photos(
         &self,
         refraction: &Refraction,
         unknowns: &[f64],
-        photos: &[Station],
+        photos: &[PhotoState],
     ) -> Vec<Vertical> {
-        let place = |(photo, station): (usize, &Station)| {
+        let place = |(photo, station): (usize, &PhotoState)| {
             if self.is_carried(photo) {
                 self.space.coordinates(station.orientation.centre())
             } else {
@@ -417,7 +430,7 @@ impl Bundle {
     }
 
     /// Returns the sense of the angles of a photo that steps by a rotation vector; None for all others.
-    pub fn turning_sense(&self, photo: usize) -> Option<RotationSense> {
+    pub fn rotation_vector_sense(&self, photo: usize) -> Option<RotationSense> {
         match self.poses {
             PoseNumbers::Angles(sense) if self.turning[photo] => Some(sense),
             PoseNumbers::Angles(_) | PoseNumbers::Vectors => None,
@@ -431,27 +444,28 @@ impl Bundle {
 
 impl Bundle {
     /// Evaluates photos, points and shared parameters at given parameter values.
-    pub fn evaluated(&self, unknowns: &[f64]) -> Stations {
-        let photos = &unknowns[self.of_stations()];
+    pub fn evaluated(&self, unknowns: &[f64]) -> LinearizationPoint {
+        let photos = &unknowns[self.parameter_unknowns()];
         let (local, tied) = self.all_coordinates(unknowns);
-        let mut stations = self.without_points(photos);
-        stations.refracted = self.refraction.map(|refraction| Refracted {
+        let mut linearization = self.without_points(photos);
+        linearization.refracted = self.refraction.map(|refraction| Refracted {
             refraction,
-            at_photos: self.verticals_at_photos(&refraction, photos, &stations.photos),
+            at_photos: self.verticals_at_photos(&refraction, photos, &linearization.photos),
             at_points: verticals(&refraction, self.space, local.iter().chain(tied)),
         });
         let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
-        stations.points = if self.passages.have_figures() {
-            let commons = &stations.commons;
-            let shift = |point| self.passages.shift(point, |common| commons[common].vector());
+        linearization.points = if self.image_corrections.have_figures() {
+            let commons = &linearization.commons;
+            let shift = |point| self.image_corrections.shift(point, |common| commons[common].vector());
             let shifted = |point| place(&(Vector3::from(local[point]) + shift(point)).into());
             parallel::map_in_place(local.len(), 1024, &shifted)
         } else {
             parallel::map_in_place(local.len(), 1024, &|point| place(&local[point]))
         };
-        stations.points.extend(tied.iter().map(place));
-        stations.coordinates = if self.observations.is_empty() { vec![] } else { [local, tied].concat() };
-        stations
+        linearization.points.extend(tied.iter().map(place));
+        linearization.coordinates =
+            if self.observations.is_empty() { vec![] } else { [local, tied].concat() };
+        linearization
     }
 }
 

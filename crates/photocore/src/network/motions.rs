@@ -6,11 +6,11 @@
 
 use std::collections::BTreeMap;
 
-use super::commons::{CommonState, PlacedCommon, SimilarityMotion};
+use super::commons::{CartesianCommon, CommonState, SimilarityMotion};
+use super::linearization_point::LinearizationPoint;
 use super::model::{Bundle, Components};
 use super::mounts::{AT_PHOTO, Trajectory};
 use super::observations::Observation;
-use super::stations::Stations;
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::trajectory::{Active, Flight};
 use crate::geometry::{Matrix3, Pose, Vector3};
@@ -264,8 +264,8 @@ impl Bundle {
         };
         let Trajectory { course, position, rotation } = self.mounts.trajectory(trajectory);
         let nearest = [(&course.position, position), (&course.rotation, rotation)].map(|(basis, all)| {
-            let apart = |&k: &usize| basis.middle(k).map_or(0.0, |middle| (middle - time).abs());
-            let nearer = |a: &usize, b: &usize| apart(a).total_cmp(&apart(b));
+            let difference = |&k: &usize| basis.middle(k).map_or(0.0, |middle| (middle - time).abs());
+            let nearer = |a: &usize, b: &usize| difference(a).total_cmp(&difference(b));
             (0..all.len()).min_by(nearer).and_then(|k| self.of_common(all[k]))
         });
         nearest.into_iter().flatten().flatten().collect()
@@ -292,9 +292,9 @@ impl Bundle {
     /// mean displacement of their antennas.
     pub(super) fn move_commons(
         &self,
-        placed: &Stations,
+        placed: &LinearizationPoint,
         motion: &SimilarityMotion<'_>,
-        each: impl Fn(&PlacedCommon, &CommonState) -> Vec<f64>,
+        each: impl Fn(&CartesianCommon, &CommonState) -> Vec<f64>,
         unknowns: &mut [f64],
     ) {
         let all = self.commons.iter().zip(&placed.commons).enumerate();
@@ -317,7 +317,7 @@ impl Bundle {
     }
 
     /// Returns the antennas of each pair of shift and drift that no other pair shares.
-    fn antennas(&self, placed: &Stations) -> Antennas {
+    fn antennas(&self, placed: &LinearizationPoint) -> Antennas {
         let mut all = Antennas::new();
         for tied in &self.observations {
             let Observation::Position(own) = &tied.observation else { continue };

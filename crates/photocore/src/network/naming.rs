@@ -32,10 +32,10 @@ impl NetworkError {
     /// Converts combinations of retained blocks: photos, cameras and shared parameters if any, else the points.
     fn undetermined(combinations: Vec<Vec<usize>>, assembled: &Assembled) -> Self {
         let model = &assembled.problem.model;
-        let stations = model.stations();
-        let of_stations = |blocks: &Vec<usize>| {
+        let count = model.parameter_blocks();
+        let parameter_unknowns = |blocks: &Vec<usize>| {
             let mut found = Combination::default();
-            for &block in blocks.iter().filter(|&&block| block < stations) {
+            for &block in blocks.iter().filter(|&&block| block < count) {
                 for (owner, _) in model.owners(block) {
                     match owner {
                         Owner::Photo(photo) => found.photos.push(photo),
@@ -46,11 +46,11 @@ impl NetworkError {
             }
             (found != Combination::default()).then_some(found)
         };
-        let found: Vec<Combination> = combinations.iter().filter_map(of_stations).collect();
+        let found: Vec<Combination> = combinations.iter().filter_map(parameter_unknowns).collect();
         if !found.is_empty() {
             return Self::Undetermined(found);
         }
-        let point = |block: usize| assembled.points[model.locals + block - stations];
+        let point = |block: usize| assembled.points[model.locals + block - count];
         let mut points: Vec<usize> = combinations.into_iter().flatten().map(point).collect();
         points.sort_unstable();
         points.dedup();
@@ -100,7 +100,7 @@ impl Network {
         let mut all = vec![[0.0; 2]; values.len()];
         moved.iter().for_each(|&(unknown, x, n)| all[unknown] = [x, n]);
         let share = |unknown: usize| all[unknown][1] * all[unknown][0].powi(2);
-        let photos = model.photos(&values[model.of_stations()]);
+        let photos = model.photos(&values[model.parameter_unknowns()]);
         let mut parts = [0.0; 4];
         let mut parameters: Vec<Vec<f64>> =
             self.cameras.iter().map(|camera| vec![0.0; camera.sd.len()]).collect();

@@ -2,10 +2,10 @@
 
 use super::error::Coarse;
 use super::input::{Network, Start};
+use super::linearization_point::PhotoState;
 use super::model::Bundle;
 use super::neighbourhood::TOGETHER;
 use super::selection::Selected;
-use super::stations::Station;
 use crate::adjustment::median;
 use crate::geometry::PoseNumbers;
 use crate::parallel;
@@ -111,7 +111,7 @@ impl Bundle {
     /// coordinates.
     pub(super) fn middle_distance(
         &self,
-        photos: &[Station],
+        photos: &[PhotoState],
         coordinates: Option<&[[f64; 3]]>,
     ) -> Option<f64> {
         let distances: Vec<f64> = match coordinates {

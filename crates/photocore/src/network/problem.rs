@@ -3,13 +3,13 @@
 
 use super::error::NetworkError;
 use super::input::{Image, Network, Options, Point, Start, State};
+use super::interface::Interface;
 use super::layout::layout;
+use super::linearization_point::{LinearizationPoint, PhotoState};
 use super::model::{Bundle, Owner};
 use super::neighbourhood::TOGETHER;
 use super::observations::{Fault, Linear};
 use super::selection::{Dropped, LeftOut, Selected};
-use super::stations::{Station, Stations};
-use super::surroundings::Surroundings;
 use crate::adjustment::{AnyProblem, Method, Problem, median};
 use crate::geometry::{ObjectSpace, POSE, PoseNumbers};
 use crate::normals::{Layout, RowBuffer, System};
@@ -25,14 +25,14 @@ pub struct Assembled {
     /// Excluded points and photos, with reasons.
     pub dropped: Vec<Dropped>,
     /// Photos that are fixed because their images do not determine them.
-    pub(super) loose: Vec<usize>,
+    pub(super) undetermined_photos: Vec<usize>,
 }
 
 /// Adjusted values of all points and retained blocks, to continue an adjustment.
 #[doc(hidden)]
 pub struct Reached {
     points: Vec<[f64; 3]>,
-    stations: Vec<f64>,
+    parameters: Vec<f64>,
 }
 
 impl Assembled {
@@ -57,7 +57,7 @@ impl Assembled {
     pub fn names(&self) -> Vec<[usize; 3]> {
         let model = &self.problem.model;
         let mut names = vec![[0; 3]; self.problem.initial.len()];
-        for (owner, range) in (0..model.stations()).flat_map(|block| model.owners(block)) {
+        for (owner, range) in (0..model.parameter_blocks()).flat_map(|block| model.owners(block)) {
             let (kind, index) = match owner {
                 Owner::Photo(photo) => (0, photo),
                 Owner::Camera(camera) => (1, camera),
@@ -110,18 +110,19 @@ impl Assembled {
     /// Returns the squared distance of each point from its nearest station at given values.
     pub fn nearest_stations(&self, unknowns: &[f64]) -> Vec<f64> {
         let model = &self.problem.model;
-        let photos = model.photos(&unknowns[model.of_stations()]);
+        let photos = model.photos(&unknowns[model.parameter_unknowns()]);
         let of_point = |(at, images): (&[f64; 3], &[usize])| {
             let position = model.space.cartesian(*at);
-            let square =
-                |image: &Image| photos[image.photo].orientation.pose().sight(&position).norm_squared();
+            let square = |image: &Image| {
+                photos[image.photo].orientation.pose().to_camera_frame(&position).norm_squared()
+            };
             model.images[images[0]..images[1]].iter().map(square).fold(f64::INFINITY, f64::min)
         };
         model.coordinates(unknowns).zip(model.point_images.start.windows(2)).map(of_point).collect()
     }
 
     /// Replaces the initial values by an adjusted state.
-    pub fn go_on_from(&mut self, state: &State) -> Result<(), NetworkError> {
+    pub fn start_from(&mut self, state: &State) -> Result<(), NetworkError> {
         if state.unknowns.len() != self.problem.initial.len() {
             return Err(NetworkError::State);
         }
@@ -134,7 +135,7 @@ impl Assembled {
         let model = &self.problem.model;
         let mut all = vec![[f64::NAN; 3]; count];
         self.points.iter().zip(model.coordinates(unknowns)).for_each(|(&point, &at)| all[point] = at);
-        Reached { points: all, stations: unknowns[model.of_stations()].to_vec() }
+        Reached { points: all, parameters: unknowns[model.parameter_unknowns()].to_vec() }
     }
 }
 
@@ -150,7 +151,7 @@ impl Network {
         reached: Option<&Reached>,
         threads: &Threads,
     ) -> Result<Assembled, NetworkError> {
-        let selected = threads.install(|| self.select(left_out, Surroundings::default()));
+        let selected = threads.install(|| self.select(left_out, Interface::default()));
         if selected.points.is_empty() {
             return Err(NetworkError::Empty);
         }
@@ -197,13 +198,14 @@ impl Network {
         let mut images_on = vec![0; self.photos.len()];
         images.iter().for_each(|image| images_on[image.photo] += 1);
         let used = self.used(&images_on);
-        let loose = selected.loose.clone();
-        let unused =
-            |photo: usize| !used[photo] && (options.hold_unused || loose.binary_search(&photo).is_ok());
+        let undetermined_photos = selected.undetermined_photos.clone();
+        let unused = |photo: usize| {
+            !used[photo] && (options.hold_unused || undetermined_photos.binary_search(&photo).is_ok())
+        };
         if reached.is_none() {
             self.check_rounding(&selected, |photo| !unused(photo))?;
         }
-        let middle = selected.surroundings.middle.unwrap_or_else(|| self.middle());
+        let middle = selected.interface.middle.unwrap_or_else(|| self.middle());
         let origin = self.origin(middle);
         let mut model = self.bundle(&mut selected, images, images_on, middle)?;
         model.datum.minimum = options.minimum;
@@ -220,8 +222,8 @@ impl Network {
             PoseNumbers::Vectors => pose,
         };
         let values = reached.map_or_else(
-            || self.station_values(&model, |photo| local(photo.pose)),
-            |reached| reached.stations.clone(),
+            || self.parameter_values(&model, |photo| local(photo.pose)),
+            |reached| reached.parameters.clone(),
         );
         let placed = model.without_points(&values);
         let start = match reached {
@@ -230,28 +232,28 @@ impl Network {
         };
         // Order: local points, photos and shared cameras, points that observations connect with other objects.
         let locals = model.locals;
-        let unknowns = |points: &[[f64; 3]], stations: &[f64]| {
+        let unknowns = |points: &[[f64; 3]], parameters: &[f64]| {
             let (local, tied) = points.split_at(locals);
-            [local.as_flattened(), stations, tied.as_flattened()].concat()
+            [local.as_flattened(), parameters, tied.as_flattened()].concat()
         };
-        if !model.passages.is_empty() {
-            model.open_windows(&unknowns(&start, &values));
+        if !model.image_corrections.is_empty() {
+            model.activate_knots(&unknowns(&start, &values));
         }
         let of_points =
             |each: fn(&Point) -> [f64; 3]| -> Vec<[f64; 3]> { model.points.iter().map(each).collect() };
-        let observed = self.station_values(&model, |photo| local(self.observed_pose(photo)));
-        let station_sd = self.station_sd(&model, &selected.surroundings, unused);
+        let observed = self.parameter_values(&model, |photo| local(self.observed_pose(photo)));
+        let parameter_sd = self.parameter_sd(&model, &selected.interface, unused);
         let (mut initial, mut prior, mut sd) = (vec![], vec![], vec![]);
         parallel::join(&mut || initial = unknowns(&start, &values), &mut || {
             parallel::join(
                 &mut || prior = unknowns(&of_points(|point| point.coordinates), &observed),
-                &mut || sd = unknowns(&of_points(|point| point.sd), &station_sd),
+                &mut || sd = unknowns(&of_points(|point| point.sd), &parameter_sd),
             );
         });
         let places = self.places(&model, &placed.photos, &start[model.locals..]);
         let observation_sd = observation_sd(&model);
         let held: Vec<bool> = sd.iter().map(|&sd| sd == 0.0).collect();
-        let (outer, below) = selected.surroundings.blocks(&model, &selected.points)?;
+        let (outer, below) = selected.interface.blocks(&model, &selected.points)?;
         let layout = layout(&model, places)?.with_held(&held).as_part(outer, below)?;
         model.linearize_observations(&initial, &layout)?;
         let problem = Problem {
@@ -262,7 +264,12 @@ impl Network {
             sd,
             model,
         };
-        Ok(Assembled { problem, points: selected.points, dropped: selected.dropped, loose: selected.loose })
+        Ok(Assembled {
+            problem,
+            points: selected.points,
+            dropped: selected.dropped,
+            undetermined_photos: selected.undetermined_photos,
+        })
     }
 
     /// Returns which photos are active; a frame is active if a photo on it is.
@@ -274,9 +281,8 @@ impl Network {
     }
 
     /// Returns the positions of the retained blocks for an ordering by position; `tied` are the points that are not local.
-    fn places(&self, model: &Bundle, stations: &[Station], tied: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let centres: Vec<[f64; 3]> =
-            stations.iter().map(|station| station.orientation.centre().into()).collect();
+    fn places(&self, model: &Bundle, photos: &[PhotoState], tied: &[[f64; 3]]) -> Vec<[f64; 3]> {
+        let centres: Vec<[f64; 3]> = photos.iter().map(|photo| photo.orientation.centre().into()).collect();
         let cameras = model.places_of_cameras(&centres);
         let tied: Vec<[f64; 3]> = tied.iter().map(|&at| self.space.cartesian(at).into()).collect();
         let commons = model.places_of_commons(&centres, &tied);
@@ -289,7 +295,7 @@ impl Network {
         start: Start,
         selected: &Selected,
         model: &Bundle,
-        placed: &Stations,
+        placed: &LinearizationPoint,
     ) -> Result<Vec<[f64; 3]>, NetworkError> {
         let given = || model.points.iter().map(|point| point.coordinates);
         if start == Start::Given && given().flatten().all(|value| !value.is_nan()) {
@@ -319,11 +325,11 @@ impl Bundle {
         if self.observations.is_empty() {
             return Ok(());
         }
-        let (stations, mut buffer, mut found) = (self.evaluated(initial), RowBuffer::default(), vec![]);
+        let (linearization, mut buffer, mut found) = (self.evaluated(initial), RowBuffer::default(), vec![]);
         for (i, own) in self.observations.iter().enumerate() {
             let tie = self.tied_images() + i;
             let mut rows = buffer.tie(layout, tie);
-            self.observe_tie(&stations, tie, &mut rows);
+            self.observe_tie(&linearization, tie, &mut rows);
             let (constant, coefficients) = (&*rows.constant, [&*rows.local, &*rows.shared]);
             if !constant.iter().chain(coefficients.into_iter().flatten()).all(|value| value.is_finite()) {
                 let (index, kind, fault) = (own.index, own.observation.kind(), Fault::NotFinite);
@@ -331,7 +337,7 @@ impl Bundle {
             }
             // Heights, planes and lines with fixed parameters, and control are linear in X, Y and Z.
             if let Some(point) = own.local().filter(|_| self.space == ObjectSpace::Rectangular) {
-                let at = stations.coordinates[point];
+                let at = linearization.coordinates[point];
                 let (constant, coefficients) = (constant.into(), coefficients[0].into());
                 found.push(Linear { point, at, constant, coefficients });
             }

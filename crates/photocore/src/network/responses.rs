@@ -89,7 +89,8 @@ impl Trial {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let terms = self.terms(&problem.sd, &found.values);
         let near = self.near(groups, &problem.observation_sd, &terms, threads)?;
-        let is_point = |block: Option<usize>| block.is_none_or(|block| block >= problem.model.stations());
+        let is_point =
+            |block: Option<usize>| block.is_none_or(|block| block >= problem.model.parameter_blocks());
         let effects = |own: &RowCofactors| -> Vec<[f64; 3]> {
             match own.blocks.iter().find(|(block, _)| is_point(*block)) {
                 Some((_, values)) => values.as_chunks().0.to_vec(),

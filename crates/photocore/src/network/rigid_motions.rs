@@ -3,8 +3,8 @@
 use nalgebra::{Matrix4, Vector6};
 
 use super::commons::SimilarityMotion;
+use super::linearization_point::{LinearizationPoint, PhotoState};
 use super::model::{Bundle, Component, Components, MOST_PARTS, MOTIONS};
-use super::stations::{Station, Stations};
 use crate::adjustment::Motions;
 use crate::adjustment::median;
 use crate::geometry::{
@@ -103,7 +103,7 @@ impl Bundle {
         if parts.all.is_empty() {
             return None;
         }
-        let placed = self.without_points(&unknowns[self.of_stations()]);
+        let placed = self.without_points(&unknowns[self.parameter_unknowns()]);
         let photos = &placed.photos;
         let origins: Vec<Vector3> =
             parts.all.iter().map(|part| photos[part.central].orientation.centre()).collect();
@@ -160,7 +160,7 @@ impl Bundle {
     fn preferred(
         &self,
         parts: &Components,
-        photos: &[Station],
+        photos: &[PhotoState],
         origins: &[Vector3],
         vectors: &[Vec<f64>],
     ) -> Vec<usize> {
@@ -193,7 +193,7 @@ impl Bundle {
     /// Returns the first transformation of an observation's component, and the effects on its misclosure (see [`Evaluated::carried`]).
     pub(super) fn carried_by_motions(
         &self,
-        stations: &Stations,
+        linearization: &LinearizationPoint,
         observation: usize,
     ) -> Option<(usize, Vec<[f64; MOTIONS]>)> {
         let (own, parts) = (&self.observations[observation], self.parts());
@@ -203,7 +203,7 @@ impl Bundle {
         let turned = |missed: &Vector3| {
             std::array::from_fn(|k| if k < 3 { Vector3::zeros() } else { displacement(k, missed) })
         };
-        let rows = self.with_tied(stations, |model| own.carried(model, turned))?;
+        let rows = self.with_tied(linearization, |model| own.carried(model, turned))?;
         Some((MOTIONS * part, rows))
     }
 
@@ -225,7 +225,7 @@ impl Bundle {
     /// Transforms each component exactly, along the motion with rates e, w and s for unit time: a rotation about any centre fixes this
     /// centre. P -> o + e^s Exp(w) (P - o) + V e, with o the centre of the central photo.
     pub(super) fn move_rigidly(&self, unknowns: &mut [f64], amounts: &[f64]) {
-        let (parts, placed) = (self.parts(), self.without_points(&unknowns[self.of_stations()]));
+        let (parts, placed) = (self.parts(), self.without_points(&unknowns[self.parameter_unknowns()]));
         for (part, amounts) in amounts.chunks_exact(MOTIONS).take(parts.all.len()).enumerate() {
             self.move_part(parts, &placed, part, unknowns, amounts);
         }
@@ -234,7 +234,7 @@ impl Bundle {
     fn move_part(
         &self,
         parts: &Components,
-        placed: &Stations,
+        placed: &LinearizationPoint,
         part: usize,
         unknowns: &mut [f64],
         amounts: &[f64],

@@ -20,7 +20,7 @@ const HELD: usize = 3;
 const ASTRAY: f64 = 1e3;
 
 /// Final state of an adjustment.
-pub(super) struct Ended<'a> {
+pub(super) struct ScreenInput<'a> {
     pub adjusted: &'a Result<Adjustment, AdjustError>,
     pub assembled: &'a Assembled,
     pub options: &'a Options,
@@ -28,7 +28,7 @@ pub(super) struct Ended<'a> {
 
 /// Initial values of the adjustment after an exclusion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Begin {
+pub(super) enum Restart {
     /// Initial values: the excluded objects have corrupted all others.
     FromStart,
     /// Start of the preceding adjustment.
@@ -39,47 +39,47 @@ pub(super) enum Begin {
 
 /// Detected objects: indices into the network.
 #[derive(Debug, Default)]
-struct Leaves {
+struct Detected {
     pub points: Vec<Dropped>,
     pub photos: Vec<usize>,
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct Leaving {
+pub(super) struct Exclusions {
     pub left_out: LeftOut,
     /// Excluded points that harm the others.
     pub harmful: Vec<Dropped>,
 }
 
 /// Switch and function of a screen, and the start of the adjustment after its exclusions.
-type Screen = (fn(&Screens) -> bool, fn(&Ended<'_>) -> Leaves, Begin);
+type Screen = (fn(&Screens) -> bool, fn(&ScreenInput<'_>) -> Detected, Restart);
 
 /// Causes of a failed adjustment, the most certain first.
 const GONE_WRONG: [Screen; 3] = [
-    (|on| on.not_determined, not_determined, Begin::AsBefore),
-    (|on| on.ran_off, ran_off, Begin::FromStart),
-    (|on| on.at_station, at_station, Begin::FromStart),
+    (|on| on.not_determined, not_determined, Restart::AsBefore),
+    (|on| on.ran_off, ran_off, Restart::FromStart),
+    (|on| on.at_station, at_station, Restart::FromStart),
 ];
 /// Cause of a stopped adjustment. Points that ran off and points at a station are distinguished only at the end.
-const STOPPED: Screen = (|on| on.ran_into_station || on.ran_off, collapsed, Begin::FromHere);
+const STOPPED: Screen = (|on| on.ran_into_station || on.ran_off, collapsed, Restart::FromHere);
 
 /// All screens, and the exclusions so far.
 #[derive(Debug)]
 pub(super) struct Screening {
-    pub leaving: Leaving,
+    pub leaving: Exclusions,
     near_station: NearStation,
 }
 
 impl Screening {
     pub fn new(left_out: LeftOut) -> Self {
-        let leaving = Leaving { left_out, harmful: vec![] };
+        let leaving = Exclusions { left_out, harmful: vec![] };
         Self { near_station: NearStation::Untried(leaving.clone()), leaving }
     }
 
     /// Excludes harmful points and photos; returns None if all remain.
-    pub fn look(&mut self, ended: &Ended<'_>) -> Option<Begin> {
+    pub fn detect(&mut self, ended: &ScreenInput<'_>) -> Option<Restart> {
         if self.near_station.is_untried() && self.near_station.tries(ended, &mut self.leaving) {
-            return Some(Begin::FromStart);
+            return Some(Restart::FromStart);
         }
         let gone_wrong = GONE_WRONG.iter().find_map(|screen| self.leave(screen, ended));
         if gone_wrong.is_some() {
@@ -87,16 +87,16 @@ impl Screening {
         }
         // The improvement without points near stations is judged after all other causes.
         if !self.near_station.is_untried() && self.near_station.tries(ended, &mut self.leaving) {
-            return Some(Begin::FromStart);
+            return Some(Restart::FromStart);
         }
         self.leave(&STOPPED, ended)
     }
 
-    fn leave(&mut self, (is_on, look, begin): &Screen, ended: &Ended<'_>) -> Option<Begin> {
+    fn leave(&mut self, (is_on, detect, begin): &Screen, ended: &ScreenInput<'_>) -> Option<Restart> {
         if !is_on(&ended.options.screens) {
             return None;
         }
-        let Leaves { points, photos } = look(ended);
+        let Detected { points, photos } = detect(ended);
         let some = !(points.is_empty() && photos.is_empty());
         points.iter().for_each(|dropped| self.leaving.left_out.points[dropped.point] = true);
         photos.iter().for_each(|&photo| self.leaving.left_out.photos[photo] = true);
@@ -109,12 +109,12 @@ impl Screening {
 #[derive(Debug)]
 enum NearStation {
     /// Exclusions that apply in any case.
-    Untried(Leaving),
+    Untried(Exclusions),
     /// Trial without the points; `variance` (infinite without convergence) and the exclusions `with` belong to the state before.
     Out {
         points: Vec<usize>,
         variance: f64,
-        with: Leaving,
+        with: Exclusions,
     },
     Decided,
 }
@@ -127,7 +127,7 @@ impl NearStation {
     /// Returns true if the adjustment must be repeated with or without the points, and sets its exclusions.
     ///
     /// The variance is significant only for least squares without the rules of historic programs.
-    pub fn tries(&mut self, ended: &Ended<'_>, leaving: &mut Leaving) -> bool {
+    pub fn tries(&mut self, ended: &ScreenInput<'_>, leaving: &mut Exclusions) -> bool {
         let options = &ended.options.adjustment;
         let tells = options.loss.is_none() && !matches!(options.method, Method::Full(_));
         if !(tells && ended.options.screens.near_station) {
@@ -175,58 +175,58 @@ fn variance(ended: &Result<Adjustment, AdjustError>) -> Option<f64> {
 }
 
 /// Returns the undetermined points and photos at which the adjustment has ended.
-fn not_determined(ended: &Ended<'_>) -> Leaves {
+fn not_determined(ended: &ScreenInput<'_>) -> Detected {
     match ended.adjusted {
         Ok(Adjustment { undetermined: Some(error), .. }) | Err(error) => {
             let points = ended.assembled.few_points(error).into_iter();
             let reason = Reason::NotDetermined;
-            Leaves {
+            Detected {
                 points: points.map(|point| Dropped { point, reason }).collect(),
                 photos: ended.assembled.few_photos(error),
             }
         }
-        Ok(_) => Leaves::default(),
+        Ok(_) => Detected::default(),
     }
 }
 
 /// Returns free points that an adjustment without convergence has moved out of the network or to a station, if these are few.
 ///
 /// Diverging rays fit best at infinity, which least squares approaches slowly while photos rotate accordingly.
-fn ran_off(ended: &Ended<'_>) -> Leaves {
-    let Ok(adjusted) = ended.adjusted else { return Leaves::default() };
+fn ran_off(ended: &ScreenInput<'_>) -> Detected {
+    let Ok(adjusted) = ended.adjusted else { return Detected::default() };
     let damped = matches!(ended.options.adjustment.method, Method::Damped(_));
     if adjusted.status != Status::NotConverged || !damped {
-        return Leaves::default();
+        return Detected::default();
     }
     let squares = ended.assembled.nearest_stations(&adjusted.unknowns);
-    let Some(middle) = median(squares.clone()) else { return Leaves::default() };
+    let Some(middle) = median(squares.clone()) else { return Detected::default() };
     let model = &ended.assembled.problem.model;
     let is_out = |&local: &usize| {
-        let apart = (squares[local] / middle).sqrt();
-        model.points[local].held() == [false; 3] && !(ASTRAY.recip()..=ASTRAY).contains(&apart)
+        let difference = (squares[local] / middle).sqrt();
+        model.points[local].held() == [false; 3] && !(ASTRAY.recip()..=ASTRAY).contains(&difference)
     };
     let mut out: Vec<usize> = (0..model.locals).filter(is_out).collect();
     if FEW * out.len() > model.locals {
         out.clear();
     }
     let dropped = |i: usize| Dropped { point: ended.assembled.points[i], reason: Reason::RanOff };
-    Leaves { points: out.into_iter().map(dropped).collect(), photos: vec![] }
+    Detected { points: out.into_iter().map(dropped).collect(), photos: vec![] }
 }
 
 /// Returns points at the position of a station that observes them: their images are undefined.
-fn at_station(ended: &Ended<'_>) -> Leaves {
-    let Err(AdjustError::NotFinite) = ended.adjusted else { return Leaves::default() };
+fn at_station(ended: &ScreenInput<'_>) -> Detected {
+    let Err(AdjustError::NotFinite) = ended.adjusted else { return Detected::default() };
     let squares = ended.assembled.nearest_stations(&ended.assembled.problem.initial);
     let at_station = ended.assembled.points.iter().zip(&squares).filter(|(_, square)| **square == 0.0);
     let dropped = |(&point, _): (&usize, &f64)| Dropped { point, reason: Reason::AtStation };
-    Leaves { points: at_station.map(dropped).collect(), photos: vec![] }
+    Detected { points: at_station.map(dropped).collect(), photos: vec![] }
 }
 
 /// Returns the points for which an adjustment has stopped: they ran into a station or out of the network.
-fn collapsed(ended: &Ended<'_>) -> Leaves {
-    let Ok(adjusted) = ended.adjusted else { return Leaves::default() };
+fn collapsed(ended: &ScreenInput<'_>) -> Detected {
+    let Ok(adjusted) = ended.adjusted else { return Detected::default() };
     if adjusted.collapsed.is_empty() {
-        return Leaves::default();
+        return Detected::default();
     }
     let squares = ended.assembled.nearest_stations(&adjusted.unknowns);
     let middle = median(squares.clone()).unwrap_or(f64::INFINITY);
@@ -234,7 +234,7 @@ fn collapsed(ended: &Ended<'_>) -> Leaves {
         point: ended.assembled.points[local],
         reason: if squares[local] > middle { Reason::RanOff } else { Reason::RanIntoStation },
     };
-    Leaves { points: adjusted.collapsed.iter().map(dropped).collect(), photos: vec![] }
+    Detected { points: adjusted.collapsed.iter().map(dropped).collect(), photos: vec![] }
 }
 
 impl Assembled {

@@ -2,9 +2,9 @@
 
 use super::error::NetworkError;
 use super::input::{Network, State};
+use super::interface::{BlockId, Interface};
 use super::neighbourhood::{ByPoint, TOGETHER};
 use super::observations::Touches;
-use super::surroundings::{BlockOf, Surroundings};
 use crate::parallel;
 
 /// Minimum ratio of all objects to excluded ones, for which these count as few.
@@ -72,7 +72,9 @@ impl Network {
     pub fn left_out(&self, photos: Vec<bool>, state: Option<&State>) -> Result<LeftOut, NetworkError> {
         let mut all = LeftOut { points: vec![false; self.points.len()], photos };
         if let Some(state) = state {
-            for (own, left) in [(&mut all.points, &state.collapsed), (&mut all.photos, &state.loose)] {
+            for (own, left) in
+                [(&mut all.points, &state.collapsed), (&mut all.photos, &state.undetermined_photos)]
+            {
                 for &index in left {
                     *own.get_mut(index).ok_or(NetworkError::State)? = true;
                 }
@@ -88,10 +90,10 @@ impl Network {
     ///
     /// Points that observations connect with other objects are the last ones. Images on excluded photos are ignored.
     #[doc(hidden)]
-    pub fn select(&self, left_out: &LeftOut, surroundings: Surroundings) -> Selected {
-        let loose = &left_out.photos;
-        let named = surroundings.indices(BlockOf::Point);
-        let all = self.point_images(loose);
+    pub fn select(&self, left_out: &LeftOut, interface: Interface) -> Selected {
+        let undetermined_photos = &left_out.photos;
+        let named = interface.indices(BlockId::Point);
+        let all = self.point_images(undetermined_photos);
         let (mut points, mut dropped) = (Vec::new(), Vec::new());
         let along = self.along_curve(&all);
         let reason = |place: usize| self.reason(along[place], all.of(along[place]));
@@ -120,8 +122,9 @@ impl Network {
             images.order.extend(all.of(point));
             images.start.push(images.order.len());
         }
-        let loose = (0..loose.len()).filter(|&photo| loose[photo]).collect();
-        Selected { points, locals, images, observations, dropped, loose, surroundings }
+        let undetermined_photos =
+            (0..undetermined_photos.len()).filter(|&photo| undetermined_photos[photo]).collect();
+        Selected { points, locals, images, observations, dropped, undetermined_photos, interface }
     }
 
     /// Whether an observation connects its points with other points, photos or shared parameters that are not fixed.
@@ -173,8 +176,8 @@ impl Network {
     }
 
     /// Returns the images of every point, without images on excluded photos.
-    fn point_images(&self, loose: &[bool]) -> ByPoint {
-        let taken = self.images.iter().enumerate().filter(|(_, image)| !loose[image.photo]);
+    fn point_images(&self, undetermined_photos: &[bool]) -> ByPoint {
+        let taken = self.images.iter().enumerate().filter(|(_, image)| !undetermined_photos[image.photo]);
         ByPoint::new(self.points.len(), taken.map(|(index, image)| (image.point, index)))
     }
 }
@@ -189,7 +192,7 @@ pub struct Selected {
     pub observations: Vec<usize>,
     pub dropped: Vec<Dropped>,
     /// Photos whose images are excluded, ascending: they are fixed.
-    pub loose: Vec<usize>,
+    pub undetermined_photos: Vec<usize>,
     /// Interface of the network to a larger one.
-    pub surroundings: Surroundings,
+    pub interface: Interface,
 }

@@ -16,7 +16,7 @@ use super::observations::{AdjustedObservation, KindSums};
 use super::problem::Assembled;
 use super::selection::Dropped;
 use super::trial::Converged;
-use super::visibility::{Unseen, find_unseen};
+use super::visibility::{ImpossibleImages, find_impossible_images};
 use super::weak_points::WeakPoint;
 use crate::adjustment::{Adjustment, Leverages, Observed, Problem};
 use crate::geometry::Matrix3;
@@ -103,7 +103,7 @@ pub struct Solution {
     /// Adjusted additional observations; None for observations of excluded points.
     pub observations: Vec<Option<AdjustedObservation>>,
     /// Physically impossible images.
-    pub unseen: Unseen,
+    pub unseen: ImpossibleImages,
     /// Parameters that are undetermined at the adjusted values, if cofactors were requested but do not exist.
     pub undetermined: Option<NetworkError>,
     /// Weakly determined parameters and points.
@@ -125,7 +125,7 @@ pub struct Solution {
     pub state: State,
     /// Joint cofactors of the requested points (see [`super::NetworkAdjustment::kept`]).
     pub joint: Option<Arc<Joint>>,
-    /// Converged problem with its cofactors, from which tests are computed without a new linearization.
+    /// Converged problem with its cofactors, from which tests are computed without a new parameters.
     pub converged: Option<Box<Converged>>,
     /// Status, iterations, counts, operations and times.
     pub adjustment: Adjustment,
@@ -194,7 +194,7 @@ impl Solution {
             points: adjusted_points(network, assembled, &adjustment, &unknowns),
             images,
             observations,
-            unseen: Unseen::default(),
+            unseen: ImpossibleImages::default(),
             undetermined: adjustment.undetermined.take().map(|error| NetworkError::new(error, assembled)),
             weak: Weak {
                 photos: owned(problem, &adjustment.weak, Owner::Photo),
@@ -212,7 +212,7 @@ impl Solution {
                 unknowns: vec![],
                 held: adjustment.datum.clone(),
                 collapsed,
-                loose: assembled.loose.clone(),
+                undetermined_photos: assembled.undetermined_photos.clone(),
                 ordering: adjustment.effort.ordering,
                 datum: None,
                 released: false,
@@ -225,7 +225,7 @@ impl Solution {
             variance_of_unit_weight,
             adjustment,
         };
-        let (squares, unseen) = find_unseen(assembled, &unknowns, &mut solution.points);
+        let (squares, unseen) = find_impossible_images(assembled, &unknowns, &mut solution.points);
         solution.unseen = unseen;
         let (model, points) = (&problem.model, &assembled.points[..]);
         solution.weak.points = network.weak_points(model, points, &solution.points, &squares);
@@ -287,14 +287,14 @@ fn sums_of_squares(
     unknowns: &[f64],
     observations: &[Option<AdjustedObservation>],
 ) -> SumsByType {
-    let stations = problem.model.of_stations();
+    let parameters = problem.model.parameter_unknowns();
     let terms = problem.any().terms(unknowns);
     let squares = |range: Range<usize>| terms.sum_of_squares(range);
     let rows = problem.layout().rows();
     let of_images = &problem.observation_sd[..rows * problem.model.images.len()];
     SumsByType {
-        camera: squares(stations.clone()),
-        ground: squares(0..stations.start) + squares(stations.end..unknowns.len()),
+        camera: squares(parameters.clone()),
+        ground: squares(0..parameters.start) + squares(parameters.end..unknowns.len()),
         plates: adjustment.reweighted_sum_of_squares(of_images, rows),
         observations: observations.iter().flatten().fold(0.0, |sum, own| sum + own.square),
     }
@@ -308,12 +308,12 @@ fn redundancies(
 ) -> Option<SumsByType> {
     let of_observations = adjustment.redundancy.as_ref()?;
     let of_unknowns = adjustment.prior_redundancy.as_ref()?;
-    let stations = problem.model.of_stations();
+    let parameters = problem.model.parameter_unknowns();
     let images = problem.layout().rows() * problem.model.images.len();
     let sum = |values: &[f64]| values.iter().sum::<f64>();
     Some(SumsByType {
-        camera: sum(&of_unknowns[stations.clone()]),
-        ground: sum(&of_unknowns[..stations.start]) + sum(&of_unknowns[stations.end..]),
+        camera: sum(&of_unknowns[parameters.clone()]),
+        ground: sum(&of_unknowns[..parameters.start]) + sum(&of_unknowns[parameters.end..]),
         plates: sum(&of_observations[..images]),
         observations: observations.iter().flatten().fold(0.0, |all, own| all + sum(&own.redundancy)),
     })
@@ -327,8 +327,8 @@ fn degrees_of_freedom(
     adjustment: &Adjustment,
 ) -> i64 {
     let counts = adjustment.counts;
-    let stations = problem.model.of_stations();
-    let weighted_cameras = stations.filter(|&unknown| problem.is_weighted(unknown)).count();
+    let parameters = problem.model.parameter_unknowns();
+    let weighted_cameras = parameters.filter(|&unknown| problem.is_weighted(unknown)).count();
     let weighted = match unit_variance {
         UnitVariance::Free => counts.weighted - weighted_cameras,
         UnitVariance::Constrained | UnitVariance::Redundancy | UnitVariance::Unity => counts.weighted,

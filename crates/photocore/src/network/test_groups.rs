@@ -307,7 +307,7 @@ impl TestGroups {
             let (id, own) = ((TestKind::Camera, camera_of_photo(photo)), model.of_photo(photo));
             self.add_weighted(assembled, id, [NONE; 2], own.start + 6..own.end);
         }
-        for (owner, unknowns) in (0..model.stations()).flat_map(|block| model.owners(block)) {
+        for (owner, unknowns) in (0..model.parameter_blocks()).flat_map(|block| model.owners(block)) {
             let id = match owner {
                 Owner::Camera(camera) => (TestKind::Camera, camera),
                 Owner::Common(common) => (TestKind::Common, common),

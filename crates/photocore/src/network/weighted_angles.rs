@@ -18,7 +18,7 @@ impl Bundle {
     /// The sum of squares equals the one for angles as parameters.
     pub(super) fn add_weighted_angles(&self, values: &[f64], prior: &[f64], sd: &[f64], terms: &mut Terms) {
         for photo in 0..self.cameras.len() {
-            let Some(sense) = self.turning_sense(photo) else { continue };
+            let Some(sense) = self.rotation_vector_sense(photo) else { continue };
             let first = self.of_block(photo).start + 3;
             let three = |all: &[f64]| -> [f64; 3] { std::array::from_fn(|k| all[first + k]) };
             let (angles, observed, sd) = (three(values), three(prior), Vector3::from(three(sd)));
@@ -46,8 +46,8 @@ fn angle_equations(
 ) -> (Vector3, Matrix3) {
     let numbers = AttitudeNumbers::OmegaPhiKappa(sense);
     let (root, weighted) = (sd.map(f64::recip), sd.map(f64::is_finite));
-    let apart = |k: usize| if weighted[k] { observed[k] - angles[k] } else { 0.0 };
-    let constant = Vector3::from_fn(|k, _| apart(k)).component_mul(&root);
+    let difference = |k: usize| if weighted[k] { observed[k] - angles[k] } else { 0.0 };
+    let constant = Vector3::from_fn(|k, _| difference(k)).component_mul(&root);
     // At a singular attitude, the angles do not restrict the step.
     (constant, Matrix3::from_diagonal(&root) * numbers.by_step(angles).unwrap_or_else(Matrix3::zeros))
 }

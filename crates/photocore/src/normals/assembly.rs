@@ -6,7 +6,7 @@ use super::batch::Batch;
 use super::equations::{Equations, Prior, RowBuffer};
 use super::front::Front;
 use super::incidence::Batches;
-use super::panels::Handover;
+use super::panels::PerSupernode;
 use super::system::System;
 use super::vectorised::LANES;
 use super::workspace::reserved;
@@ -44,7 +44,7 @@ impl Formation<'_> {
         &self,
         front: &mut Front<'_>,
         index: usize,
-        cached: &Handover<Vec<f64>>,
+        cached: &PerSupernode<Vec<f64>>,
     ) -> Option<Sums> {
         let Self { system, control, .. } = self;
         let layout = &system.layout;
@@ -76,7 +76,7 @@ impl Formation<'_> {
             });
             for batch in filled {
                 sums.add(batch);
-                if self.caches && !batch.apart {
+                if self.caches && !batch.uncoupled {
                     batch.cache(layout, &mut sums.cached);
                 }
             }
@@ -98,7 +98,7 @@ impl Formation<'_> {
             self.fill(&mut batch, run);
             batch.add_to(&mut front.columns(), layout);
             sums.add(&mut batch);
-            if self.caches && !batch.apart {
+            if self.caches && !batch.uncoupled {
                 batch.cache_in_place(layout);
             }
         }

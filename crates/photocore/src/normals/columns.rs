@@ -194,7 +194,7 @@ impl System {
         for run in self.incidence.batches_at(index).iter().take_while(|_| !control.stopped()) {
             batch.gather(equations, self, run);
             batch.eliminate_from_rights(&self.layout, equations.prior());
-            if !batch.apart {
+            if !batch.uncoupled {
                 found.own.extend_from_slice(batch.reduced.as_chunks().0);
             }
             let start = found.values.len();

@@ -28,7 +28,7 @@ const BUFFERED: usize = 32;
 
 /// Allocates the product buffers of the current thread, twice the size of its last cache. The library reuses them. Otherwise the first
 /// large product of a thread would allocate them, and abort the process if memory is insufficient.
-pub fn take_product_buffers() {
+pub fn preallocate_product_buffers() {
     let ones = vec![1.0; BUFFERED * BUFFERED];
     let ones = MatRef::from_column_major_slice(&ones, BUFFERED, BUFFERED);
     let mut product = vec![0.0; BUFFERED * BUFFERED];

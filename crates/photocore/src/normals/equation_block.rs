@@ -140,7 +140,7 @@ impl System {
         local: usize,
     ) -> Result<RowCofactors, LayoutError> {
         LayoutError::unless_of_length("weight", weight.len(), self.layout.unknowns())?;
-        if self.layout.stands_apart(local) {
+        if self.layout.has_uncoupled_groups(local) {
             return self.cofactors_apart(selected, asked, local);
         }
         let blocks = Own::blocks(&self.layout, asked);

@@ -12,7 +12,7 @@ pub trait Equations: Sync {
 
     /// Writes the equations of one group per local block, in sequence; `groups` contains the group numbers. All groups have the same main
     /// block and the same shared blocks.
-    fn write_alike(&self, locals: &[u32], groups: &[u32], rows: &mut GroupRows<'_>) {
+    fn write_batch(&self, locals: &[u32], groups: &[u32], rows: &mut GroupRows<'_>) {
         for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
             self.write(local as usize, group as usize, &mut rows.part(t, locals.len()));
         }

@@ -10,7 +10,7 @@ use super::assembly::{Formation, Sums};
 use super::dense::{Pivots, factor_front};
 use super::equations::Equations;
 use super::front::Front;
-use super::panels::{Handover, Panels};
+use super::panels::{Panels, PerSupernode};
 use super::symbolic::Supernode;
 use super::system::{System, SystemError};
 use super::workspace::Eliminated;
@@ -144,8 +144,8 @@ impl Formation<'_> {
         let symbolic = &self.system.symbolic;
         let values = self.control.allocated(self.system.workspace.panels(symbolic.values()))?;
         let mut panels = Panels { symbolic: Arc::clone(symbolic), values };
-        let updates = Handover::new(symbolic.supernode_count());
-        let visited = Handover::new(symbolic.supernode_count());
+        let updates = PerSupernode::new(symbolic.supernode_count());
+        let visited = PerSupernode::new(symbolic.supernode_count());
         let divided = panels.divide();
         let cached = self.room();
         self.system.start();
@@ -200,8 +200,8 @@ impl Formation<'_> {
         &self,
         index: usize,
         panel: &mut [f64],
-        cached: &Handover<Vec<f64>>,
-        updates: &Handover<Update>,
+        cached: &PerSupernode<Vec<f64>>,
+        updates: &PerSupernode<Update>,
         given_up: &[usize],
     ) -> Option<Visited> {
         let symbolic = &*self.system.symbolic;
@@ -248,8 +248,8 @@ impl Formation<'_> {
     }
 
     /// Returns buffers for the cache of each supernode, reused from an earlier formation if possible.
-    fn room(&self) -> Handover<Vec<f64>> {
-        let cached = Handover::new(self.system.symbolic.supernode_count() + 1);
+    fn room(&self) -> PerSupernode<Vec<f64>> {
+        let cached = PerSupernode::new(self.system.symbolic.supernode_count() + 1);
         if self.caches {
             let spare = self.system.workspace.take_eliminated().into_iter().enumerate();
             spare.for_each(|(index, room)| cached.put(index, room));

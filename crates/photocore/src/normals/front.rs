@@ -99,14 +99,14 @@ pub(super) struct Columns<'a> {
 
 /// Matrix with consecutive columns of the front.
 #[derive(Clone, Copy)]
-pub(super) struct Strip<'a> {
+pub(super) struct PanelView<'a> {
     /// First column in the front.
     pub at: usize,
     /// The matrix.
     pub rows: Rows<'a>,
 }
 
-impl Strip<'_> {
+impl PanelView<'_> {
     /// Returns the strip without rows, so that its products are zero.
     #[inline(always)]
     pub fn emptied(self) -> Self {
@@ -123,14 +123,14 @@ impl Columns<'_> {
 
     /// Adds `sign` A^T B in the rows of A and the columns of B.
     #[inline(always)]
-    pub fn add_product<S: Simd>(&mut self, simd: S, sign: f64, a: Strip<'_>, b: Strip<'_>) {
+    pub fn add_product<S: Simd>(&mut self, simd: S, sign: f64, a: PanelView<'_>, b: PanelView<'_>) {
         let (target, stride) = self.target(a.at, b.at);
         add_product(simd, target, stride, sign, a.rows, b.rows);
     }
 
     /// Adds A^T A - V^T V in the rows and columns of both, in the given number of parts.
     #[inline(always)]
-    pub fn add_difference<S: Simd>(&mut self, simd: S, a: Strip<'_>, v: Strip<'_>, parts: usize) {
+    pub fn add_difference<S: Simd>(&mut self, simd: S, a: PanelView<'_>, v: PanelView<'_>, parts: usize) {
         let (target, stride) = self.target(a.at, a.at);
         add_difference(simd, target, stride, a.rows, v.rows, parts);
     }
@@ -151,7 +151,7 @@ impl Columns<'_> {
     pub fn add_products<S: Simd, const N: usize>(
         &mut self,
         simd: S,
-        products: [(f64, Strip<'_>, Strip<'_>); N],
+        products: [(f64, PanelView<'_>, PanelView<'_>); N],
     ) {
         let Some(&(_, a, b)) = products.first() else { return };
         let (target, stride) = self.target(a.at, b.at);
@@ -160,7 +160,7 @@ impl Columns<'_> {
 
     /// Adds A^T b to the right-hand side, and the squares of the elements of A to the initial diagonal.
     #[inline(always)]
-    pub fn add_equations<S: Simd>(&mut self, simd: S, a: Strip<'_>, b: &[f64]) {
+    pub fn add_equations<S: Simd>(&mut self, simd: S, a: PanelView<'_>, b: &[f64]) {
         let own = a.at - self.columns.start..a.at - self.columns.start + a.rows.width;
         let diagonal = Some(&mut self.diagonal[own.clone()]);
         add_right(simd, &mut self.right[own], diagonal, 1.0, a.rows, b);
@@ -206,7 +206,7 @@ impl Columns<'_> {
 
     /// Subtracts A^T b from the right-hand side.
     #[inline(always)]
-    pub fn subtract_right<S: Simd>(&mut self, simd: S, a: Strip<'_>, b: &[f64]) {
+    pub fn subtract_right<S: Simd>(&mut self, simd: S, a: PanelView<'_>, b: &[f64]) {
         let own = a.at - self.columns.start..a.at - self.columns.start + a.rows.width;
         add_right(simd, &mut self.right[own], None, -1.0, a.rows, b);
     }

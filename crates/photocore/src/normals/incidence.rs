@@ -43,12 +43,12 @@ impl Incidence {
         let starts = (0..layout.locals()).step_by(TOGETHER);
         let ranges: Vec<Range<usize>> =
             starts.map(|first| first..(first + TOGETHER).min(layout.locals())).collect();
-        let placed = |range: &Range<usize>| placed(layout, symbolic, range.clone());
+        let with_sort_keys = |range: &Range<usize>| with_sort_keys(layout, symbolic, range.clone());
         let is_many = layout.locals() >= MANY;
         let pieces: Vec<(Vec<[u32; 2]>, Vec<Keyed>)> = if is_many {
-            parallel::map_each(ranges.iter().collect(), &placed)
+            parallel::map_each(ranges.iter().collect(), &with_sort_keys)
         } else {
-            ranges.iter().map(placed).collect()
+            ranges.iter().map(with_sort_keys).collect()
         };
         let sorted = || pieces.iter().flat_map(|(sorted, _)| sorted);
         let positions: Vec<u32> = sorted().map(|&[position, _]| position).collect();
@@ -83,7 +83,8 @@ impl Incidence {
         let (batch_ptr, sets, members) = (vec![0], Vec::new(), vec![Vec::new()]);
         let mut incidence =
             Self { groups, positions, by_node, node_ptr, batch_ptr, commons, group_with, sets, members };
-        let runs = incidence.by_node.chunk_by(|&a, &b| incidence.alike(layout, a as usize, b as usize));
+        let runs =
+            incidence.by_node.chunk_by(|&a, &b| incidence.has_equal_pattern(layout, a as usize, b as usize));
         let lengths: Vec<usize> = runs.flat_map(|run| run.chunks(MOST)).map(<[u32]>::len).collect();
         let mut end = 0;
         incidence.batch_ptr.extend(lengths.into_iter().map(|length| {
@@ -116,8 +117,8 @@ impl Incidence {
     }
 
     /// Whether the equations of two units have identical patterns.
-    fn alike(&self, layout: &Layout, a: usize, b: usize) -> bool {
-        layout.is_apart(a) == layout.is_apart(b)
+    fn has_equal_pattern(&self, layout: &Layout, a: usize, b: usize) -> bool {
+        layout.is_uncoupled(a) == layout.is_uncoupled(b)
             && self.positions_of(layout, a) == self.positions_of(layout, b)
             && self.commons_of(layout, a) == self.commons_of(layout, b)
     }
@@ -213,11 +214,11 @@ type Keyed = (u128, u32);
 const HOME: u32 = 96;
 
 /// Returns positions and groups of some local blocks, by position unless independent, and the sort keys of their units.
-fn placed(layout: &Layout, symbolic: &Symbolic, locals: Range<usize>) -> (Vec<[u32; 2]>, Vec<Keyed>) {
+fn with_sort_keys(layout: &Layout, symbolic: &Symbolic, locals: Range<usize>) -> (Vec<[u32; 2]>, Vec<Keyed>) {
     let (mut sorted, mut keyed) = (Vec::new(), Vec::with_capacity(locals.len()));
     let key = |unit: usize, own: &[[u32; 2]]| {
         let node = node(layout, symbolic, unit, own.first().map(|&[position, _]| position as usize));
-        let home = 2 * node as u128 + u128::from(layout.is_apart(unit));
+        let home = 2 * node as u128 + u128::from(layout.is_uncoupled(unit));
         let first = |key: u128, k: usize| key << 32 | own.get(k).map_or(0, |own| u128::from(own[0]) + 1);
         ((0..3).fold(home, first), unit as u32)
     };
@@ -225,13 +226,13 @@ fn placed(layout: &Layout, symbolic: &Symbolic, locals: Range<usize>) -> (Vec<[u
         let start = sorted.len();
         let place = |g: usize| [symbolic.position(layout.retained_of(g)) as u32, g as u32];
         sorted.extend(layout.groups_of(local).map(place));
-        let (own, apart) = (&mut sorted[start..], layout.apart_of(local));
-        if apart.is_empty() {
+        let (own, uncoupled) = (&mut sorted[start..], layout.uncoupled_of(local));
+        if uncoupled.is_empty() {
             own.sort_unstable();
             keyed.push(key(local, own));
         } else {
             keyed.push(key(local, &[]));
-            keyed.extend(apart.zip(own.chunks(1)).map(|(unit, own)| key(unit, own)));
+            keyed.extend(uncoupled.zip(own.chunks(1)).map(|(unit, own)| key(unit, own)));
         }
     }
     (sorted, keyed)

@@ -8,13 +8,13 @@ use std::time::Instant;
 
 use faer::{MatMut, MatRef};
 
-use super::cofactors::{AtNode, Cofactors, leverages_of_groups};
+use super::cofactors::{Cofactors, NodeCofactors, leverages_of_groups};
 use super::contribution::{Contribution, packed, unpack};
 use super::dense::invert_front;
 use super::equations::Equations;
 use super::factor::Factor;
 use super::layout::LayoutError;
-use super::panels::{Handover, Panels, SelectedInverse};
+use super::panels::{Panels, PerSupernode, SelectedInverse};
 use super::symbolic::Symbolic;
 use super::system::{System, SystemError};
 use crate::context::{Context, Control, Phase};
@@ -96,8 +96,8 @@ impl Walk<'_> {
         let symbolic = &*self.system.symbolic;
         let count = symbolic.supernode_count();
         // Front of the parent of each unprocessed supernode; a front is released after its last child.
-        let above = Handover::new(count);
-        let at_node = Handover::new(count);
+        let above = PerSupernode::new(count);
+        let at_node = PerSupernode::new(count);
         let divided = panels.divide();
         self.system.start();
         self.system.tree.downward(&|index| {
@@ -144,7 +144,12 @@ impl Walk<'_> {
 
     /// Inverts one panel from the front of its parent, and passes its own front to its children. Returns the cofactors of the local blocks
     /// at this supernode, and the time of the inversion in seconds. None if memory is insufficient.
-    fn visit(&self, index: usize, panel: &mut [f64], above: &Handover<Front>) -> Option<(AtNode, f64)> {
+    fn visit(
+        &self,
+        index: usize,
+        panel: &mut [f64],
+        above: &PerSupernode<Front>,
+    ) -> Option<(NodeCofactors, f64)> {
         let symbolic = &*self.system.symbolic;
         let s = &symbolic.supernodes()[index];
         let start = Instant::now();
@@ -175,9 +180,9 @@ impl Walk<'_> {
         Some((at_node, seconds))
     }
 
-    fn at_node(&self, index: usize, front: &[f64], height: usize) -> AtNode {
+    fn at_node(&self, index: usize, front: &[f64], height: usize) -> NodeCofactors {
         let Self { system, equations, options, control } = *self;
-        AtNode::new(system, index, equations, control, front, height, options.by_groups)
+        NodeCofactors::new(system, index, equations, control, front, height, options.by_groups)
     }
 }
 

@@ -84,7 +84,7 @@ pub use cofactors::Cofactors;
 pub use columns::{Chord, ReducedRights};
 pub use contribution::{Contribution, packed};
 pub use deficiency::Deficiency;
-pub use dense::take_product_buffers;
+pub use dense::preallocate_product_buffers;
 pub use equation_block::RowCofactors;
 pub use equations::{Equations, GroupRows, Prior, RowBuffer};
 pub use factor::{Factor, FactorOptions};

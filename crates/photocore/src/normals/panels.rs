@@ -60,9 +60,9 @@ pub(super) fn skip_ref<'a, T>(rest: &mut &'a [T], count: usize) -> &'a [T] {
 }
 
 /// One value per supernode, passed between the threads that visit the supernodes.
-pub(super) struct Handover<T>(Vec<Mutex<Option<T>>>);
+pub(super) struct PerSupernode<T>(Vec<Mutex<Option<T>>>);
 
-impl<T> Handover<T> {
+impl<T> PerSupernode<T> {
     pub fn new(count: usize) -> Self {
         Self((0..count).map(|_| Mutex::new(None)).collect())
     }

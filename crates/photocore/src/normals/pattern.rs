@@ -43,7 +43,7 @@ mod tests {
     use crate::normals::{Layout, Ordering, Symbolic, Tie};
 
     /// Three local blocks with a single group each, for one of three retained blocks; a fourth retained block is unused.
-    fn apart() -> Layout {
+    fn uncoupled() -> Layout {
         Layout::new(1, 1, &[1, 1, 1, 1], vec![0, 1, 2, 3], vec![0, 1, 2]).unwrap()
     }
 
@@ -52,15 +52,15 @@ mod tests {
         let tie = Tie { rows: 1, local: None, retained: vec![0, 2] };
         let together = [
             Layout::new(1, 1, &[1, 1, 1, 1], vec![0, 2, 3], vec![0, 1, 2]).unwrap(),
-            apart().with_shared(vec![0, 0, 0, 1], vec![3]).unwrap(),
-            apart().with_ties(vec![tie]).unwrap(),
-            apart().as_part(vec![], vec![vec![1, 2]]).unwrap(),
-            apart().with_pairs(vec![[0, 3]]).unwrap(),
+            uncoupled().with_shared(vec![0, 0, 0, 1], vec![3]).unwrap(),
+            uncoupled().with_ties(vec![tie]).unwrap(),
+            uncoupled().as_part(vec![], vec![vec![1, 2]]).unwrap(),
+            uncoupled().with_pairs(vec![[0, 3]]).unwrap(),
         ];
         for layout in together {
             let its_own = Symbolic::new(&layout, Ordering::Input).unwrap();
             assert!(System::with_pattern(layout.clone(), its_own).is_ok());
-            let found = System::with_pattern(layout, Symbolic::new(&apart(), Ordering::Input).unwrap());
+            let found = System::with_pattern(layout, Symbolic::new(&uncoupled(), Ordering::Input).unwrap());
             assert!(matches!(found, Err(LayoutError::Pattern { .. })));
         }
     }

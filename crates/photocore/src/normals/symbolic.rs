@@ -374,7 +374,7 @@ fn multiply_adds(width: usize, below: usize) -> f64 {
 fn postorder(graph: &Graph, order: &[usize], inner: usize) -> Vec<usize> {
     let mut parent = elimination_tree(graph, order, &places(order));
     parent.truncate(inner);
-    let is_apart: Vec<bool> = parent.iter().map(Option::is_none).collect();
+    let is_uncoupled: Vec<bool> = parent.iter().map(Option::is_none).collect();
     parent.iter_mut().for_each(|above| *above = above.filter(|&above| above < inner));
     let mut children = vec![Vec::new(); inner];
     for (k, above) in parent.iter().enumerate() {
@@ -384,7 +384,7 @@ fn postorder(graph: &Graph, order: &[usize], inner: usize) -> Vec<usize> {
     }
     let mut result = Vec::with_capacity(order.len());
     let roots = || (0..inner).filter(|&k| parent[k].is_none());
-    for root in roots().filter(|&k| is_apart[k]).chain(roots().filter(|&k| !is_apart[k])) {
+    for root in roots().filter(|&k| is_uncoupled[k]).chain(roots().filter(|&k| !is_uncoupled[k])) {
         // Depth first with an explicit stack, parents before children; the subtree is then reversed.
         let start = result.len();
         let mut stack = vec![root];

@@ -95,7 +95,7 @@ impl System {
 
     /// Adds the local blocks of a finished batch to the progress count.
     pub(super) fn count(&self, units: &[u32], control: &Control) {
-        control.count(units.iter().filter(|&&unit| !self.layout.is_apart(unit as usize)).count());
+        control.count(units.iter().filter(|&&unit| !self.layout.is_uncoupled(unit as usize)).count());
     }
 
     /// Returns the maximum number of values in a factor: panels and cached local eliminations.

@@ -127,7 +127,7 @@ pub enum Kind {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Act {
     /// Begin of a group or object.
-    Begin(Kind),
+    Restart(Kind),
     /// End of a group or object.
     End(Kind),
     /// End of the text.
@@ -151,8 +151,8 @@ impl<'a> Statement<'a> {
         let is = |words: &[&str]| words.iter().any(|word| self.key.eq_ignore_ascii_case(word));
         // Few keys begin with these letters.
         match self.key.as_bytes().first().map(u8::to_ascii_lowercase) {
-            Some(b'o' | b'b') if is(&["Object", "Begin_Object"]) => Act::Begin(Kind::Object),
-            Some(b'g' | b'b') if is(&["Group", "Begin_Group"]) => Act::Begin(Kind::Group),
+            Some(b'o' | b'b') if is(&["Object", "Begin_Object"]) => Act::Restart(Kind::Object),
+            Some(b'g' | b'b') if is(&["Group", "Begin_Group"]) => Act::Restart(Kind::Group),
             Some(b'e') if is(&["End_Object", "EndObject"]) => Act::End(Kind::Object),
             Some(b'e') if is(&["End_Group", "EndGroup"]) => Act::End(Kind::Group),
             Some(b'e') if self.value.is_empty() && is(&["End"]) => Act::Stop,
@@ -162,7 +162,7 @@ impl<'a> Statement<'a> {
 
     /// Returns whether the statement begins a block of this kind and name.
     pub fn begins(&self, kind: Kind, name: &str) -> bool {
-        self.act() == Act::Begin(kind) && self.value.eq_ignore_ascii_case(name)
+        self.act() == Act::Restart(kind) && self.value.eq_ignore_ascii_case(name)
     }
 
     /// Returns the fault of a statement with a syntax error.

@@ -57,7 +57,7 @@ fn read_point(statements: &mut Statements<'_>, begun: usize, all: &mut Points<'_
         match statement.act() {
             Act::End(Part::Object) => break,
             Act::End(_) | Act::Stop => return Err(statement.fault()),
-            Act::Begin(_) if statement.begins(Part::Group, "ControlMeasure") => {
+            Act::Restart(_) if statement.begins(Part::Group, "ControlMeasure") => {
                 if read_measure(statements, statement.line, &mut all.measures)? {
                     let index = (all.measures.rows - first - 1) as i32;
                     if reference.replace(index).is_some() {
@@ -65,7 +65,7 @@ fn read_point(statements: &mut Statements<'_>, begun: usize, all: &mut Points<'_
                     }
                 }
             }
-            Act::Begin(kind) => keep_group(statements, &statement, kind, &mut all.points)?,
+            Act::Restart(kind) => keep_group(statements, &statement, kind, &mut all.points)?,
             Act::Give => give(&statement, &mut all.points)?,
         }
     }
@@ -83,7 +83,7 @@ fn read_measure(statements: &mut Statements<'_>, begun: usize, table: &mut Table
         match statement.act() {
             Act::End(Part::Group) => break,
             Act::End(_) | Act::Stop => return Err(statement.fault()),
-            Act::Begin(kind) => keep_group(statements, &statement, kind, table)?,
+            Act::Restart(kind) => keep_group(statements, &statement, kind, table)?,
             Act::Give if statement.key.eq_ignore_ascii_case(REFERENCE) => {
                 let read = statement.read()?;
                 is_reference =
@@ -111,7 +111,7 @@ fn keep_group(
     while let Some(&innermost) = open.last() {
         let statement = next(statements, begin.line)?;
         match statement.act() {
-            Act::Begin(kind) => open.push(kind),
+            Act::Restart(kind) => open.push(kind),
             Act::End(kind) if kind == innermost => drop(open.pop()),
             Act::End(_) | Act::Stop => return Err(statement.fault()),
             Act::Give => {}

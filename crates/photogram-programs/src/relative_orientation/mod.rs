@@ -12,7 +12,7 @@
 //! let second = Pose { position: Vector3::new(1.0, 0.0, 0.0), attitude: rotation([0.1, -0.2, 0.3]).transpose() };
 //! let point = |k: usize| Vector3::new((k % 4) as f64 - 1.0, (k / 4) as f64 - 1.0, -4.0 - (k * k % 5) as f64);
 //! let pairs: Vec<[Vector3; 2]> =
-//!     (0..12).map(point).map(|p| [p.normalize(), second.sight(&p).normalize()]).collect();
+//!     (0..12).map(point).map(|p| [p.normalize(), second.to_camera_frame(&p).normalize()]).collect();
 //! let best = &relative_orientation(&pairs)[0];
 //! assert!((best.oriented.base - second.position).norm() < 1e-6);
 //! assert!((best.oriented.attitude - second.attitude).norm() < 1e-6);

@@ -296,6 +296,6 @@ impl Evaluated for At<'_> {
 /// Returns the image position of a point and the partials of program W5344 (USGS Computer Contribution 2, 1969, equations 4 and 5). They
 /// contain the measured image position instead of the computed one; both agree if the residuals are zero.
 pub fn linearize_at_measured(photo: &View, point: &Point, measured: [f64; 2]) -> Projection {
-    let u = photo.orientation.sight(point);
+    let u = photo.orientation.to_camera_frame(point);
     photo.orientation.projection(&u, &photo.camera.linearize_at(&u, |_| measured), point)
 }

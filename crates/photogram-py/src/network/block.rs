@@ -3,7 +3,9 @@
 use nalgebra::DMatrix;
 use photocore::adjustment::{Method, Options as AdjustmentOptions, Published, Stop};
 use photocore::geometry::PoseNumbers;
-use photocore::network::{Camera, Minimum, Network, Options, Passage, Photo, Screens, Start, UnitVariance};
+use photocore::network::{
+    Camera, ImageCorrection, Minimum, Network, Options, Photo, Screens, Start, UnitVariance,
+};
 use pyo3::prelude::*;
 
 use super::block_network::BlockNetwork;
@@ -31,9 +33,9 @@ fn camera((model, parameters, sd, covariance, knots): CameraRow) -> PyResult<Cam
 /// Type; indices of shared parameters; indices of points, photos or cameras; numbers.
 type PassageRow<'py> = (String, Vec<usize>, Vec<usize>, Array<'py>);
 
-fn passage((kind, commons, of, values): PassageRow<'_>) -> PyResult<Passage> {
+fn passage((kind, commons, of, values): PassageRow<'_>) -> PyResult<ImageCorrection> {
     let values = numbers("numbers of a passage", &values)?;
-    Passage::from_numbers(&kind, &commons, &of, &values).ok_or_else(|| unknown("passage", &kind))
+    ImageCorrection::from_numbers(&kind, &commons, &of, &values).ok_or_else(|| unknown("passage", &kind))
 }
 
 #[pyfunction]
@@ -122,7 +124,7 @@ pub fn block_network(
             .collect(),
         trajectories: trajectories.into_iter().map(trajectory).collect::<PyResult<_>>()?,
         image_times: numbers("image_times", &image_times)?,
-        passages: passages.into_iter().map(passage).collect::<PyResult<_>>()?,
+        image_corrections: passages.into_iter().map(passage).collect::<PyResult<_>>()?,
     };
     let method = match criterion {
         "fraction" => Method::Damped(Stop::Fraction(limit)),

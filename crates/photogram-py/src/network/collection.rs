@@ -113,7 +113,7 @@ pub fn collection_images<'py>(
     let image = |(photo, point): (PyResult<([f64; POSE], geometry::Camera)>, [f64; 3])| {
         let ([a, b, c, x, y, z], camera) = photo?;
         let orientation = Orientation::from_vectors([a, b, c].into(), [x, y, z].into());
-        Ok(camera.image(&orientation.sight(&GroundPoint::new(ObjectSpace::Rectangular, point))))
+        Ok(camera.image(&orientation.to_camera_frame(&GroundPoint::new(ObjectSpace::Rectangular, point))))
     };
     let images: PyResult<Vec<[f64; 2]>> = py.detach(|| photos.zip(points).map(image).collect());
     table(py, images?)

@@ -107,7 +107,7 @@ fn failure(error: &Failure, what: &str) -> FailureRow {
         | Failure::CommonDeviations(_)
         | Failure::Mount(_)
         | Failure::Trajectory(_)
-        | Failure::Passage(_)
+        | Failure::ImageCorrection(_)
         | Failure::ImageTimes(_)
         | Failure::CameraConstant { .. }
         | Failure::Observation { .. }

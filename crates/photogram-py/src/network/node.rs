@@ -5,7 +5,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use photocore::Context;
-use photocore::network::{BlockOf, Network, NetworkError as Failure, Options, Surroundings};
+use photocore::network::{BlockId, Interface, Network, NetworkError as Failure, Options};
 use photocore::normals::Contribution;
 use photogram_parts::{DatumOfPart, FormedNode as Formed, Node as Core};
 use pyo3::exceptions::PyValueError;
@@ -29,12 +29,12 @@ type TransformationRow<'py> = (Array<'py>, Array<'py>, Array<'py>, Array<'py>, f
 /// Type and index of the owner of a parameter block.
 pub type BlockRow = (String, usize);
 
-fn block_of((kind, index): BlockRow) -> PyResult<BlockOf> {
+fn block_of((kind, index): BlockRow) -> PyResult<BlockId> {
     Ok(match kind.as_str() {
-        "photo" => BlockOf::Photo(index),
-        "camera" => BlockOf::Camera(index),
-        "unknown" => BlockOf::Common(index),
-        "point" => BlockOf::Point(index),
+        "photo" => BlockId::Photo(index),
+        "camera" => BlockId::Camera(index),
+        "unknown" => BlockId::Common(index),
+        "point" => BlockId::Point(index),
         other => return Err(unknown("kind of block", other)),
     })
 }
@@ -97,8 +97,8 @@ impl Node {
     }
 
     #[getter]
-    fn ends_slowly(&self) -> bool {
-        self.node.ends_slowly()
+    fn converges_linearly(&self) -> bool {
+        self.node.converges_linearly()
     }
 
     #[getter]
@@ -206,12 +206,12 @@ impl Node {
         held: Vec<(usize, usize)>,
         threads: usize,
     ) -> PyResult<Self> {
-        let blocks = |rows: Vec<BlockRow>| rows.into_iter().map(block_of).collect::<PyResult<Vec<BlockOf>>>();
+        let blocks = |rows: Vec<BlockRow>| rows.into_iter().map(block_of).collect::<PyResult<Vec<BlockId>>>();
         let below = children.into_iter().map(blocks).collect::<PyResult<_>>()?;
-        let surroundings = Surroundings { outer: blocks(outer)?, below, middle, held };
+        let interface = Interface { outer: blocks(outer)?, below, middle, held };
         let workers = Workers::of(threads, network.images.len());
         let node =
-            watched(py, workers, None, |context| Core::new(network, options, surroundings, context.threads))?;
+            watched(py, workers, None, |context| Core::new(network, options, interface, context.threads))?;
         node.map(|node| Self { node: Arc::new(node), records }).map_err(|error| failed(&error))
     }
 

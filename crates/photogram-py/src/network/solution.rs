@@ -200,7 +200,7 @@ impl BlockSolution {
             images_behind: numbers(&found.unseen.behind),
             images_folded: numbers(&found.unseen.folded),
             photo_order: numbers(&order.copied().collect::<Vec<_>>()),
-            loose_photos: found.state.loose,
+            loose_photos: found.state.undetermined_photos,
             weak_unknowns: found.weak.commons,
             adjusted_unknowns: found.commons.into_iter().map(unknown_row).collect(),
             weak_cameras: found.weak.cameras,

@@ -64,13 +64,13 @@ impl BlockState {
         unknowns: Vec<f64>,
         held: Vec<usize>,
         collapsed: Vec<usize>,
-        loose: Vec<usize>,
+        undetermined_photos: Vec<usize>,
         ordering: &str,
         datum: Option<DatumRow>,
         released: bool,
     ) -> PyResult<Self> {
         let (ordering, datum) = (named_ordering(ordering)?, datum.map(datum_of).transpose()?);
-        let state = State { unknowns, held, collapsed, loose, ordering, datum, released };
+        let state = State { unknowns, held, collapsed, undetermined_photos, ordering, datum, released };
         Ok(Self { state, kept: Kept::default(), joint: None })
     }
 
@@ -81,8 +81,9 @@ impl BlockState {
 
     /// Pickling support for copies and for other processes.
     fn __getnewargs__(&self) -> StateRow {
-        let State { unknowns, held, collapsed, loose, ordering, datum, released } = self.state.clone();
+        let State { unknowns, held, collapsed, undetermined_photos, ordering, datum, released } =
+            self.state.clone();
         let datum = datum.as_ref().map(row_of);
-        (unknowns, held, collapsed, loose, ordering.name().to_owned(), datum, released)
+        (unknowns, held, collapsed, undetermined_photos, ordering.name().to_owned(), datum, released)
     }
 }

@@ -155,8 +155,8 @@ impl RadialFactor {
             }
         }
         // In flat parts of the curve rounding changes the radius by more than its last digits.
-        let apart = radius * self.value(radius * radius) - distorted;
-        (apart.abs() <= REACHED * distorted).then_some(radius)
+        let difference = radius * self.value(radius * radius) - distorted;
+        (difference.abs() <= REACHED * distorted).then_some(radius)
     }
 }
 

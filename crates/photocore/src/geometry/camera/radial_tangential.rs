@@ -403,7 +403,7 @@ pub(super) trait Table<const N: usize>: Copy {
         Image { xy: parts.image(bending.last.xy), by_u: [by_u(0), by_u(1)], by_parameters }
     }
 
-    fn sight(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
+    fn to_camera_frame(&self, [x, y]: [f64; 2]) -> Option<Vector3> {
         let parts = self.parts();
         let b = (y - parts.origin[1]) / parts.focal[1];
         let a = (x - parts.origin[0] - parts.shear * b) / parts.focal[0];

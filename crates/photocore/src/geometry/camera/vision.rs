@@ -82,7 +82,7 @@ macro_rules! cameras_of_vision {
             }
 
             fn direction(&self, xy: [f64; 2]) -> Option<Vector3> {
-                self.sight(xy)
+                self.to_camera_frame(xy)
             }
 
             fn faces(&self, u: &Vector3) -> bool {

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 
 use crate::geometry::camera::inverse::{inverted, times};
 use crate::geometry::camera::{Ebner12, Matrix2, OrthogonalSet};
-use crate::geometry::correction::{Correction, LINEAR, Linear, PARAMETERS, Placed};
+use crate::geometry::correction::{CorrectedPosition, Correction, LINEAR, Linear, PARAMETERS};
 
 /// Functions of a deformation, dimensionless: weights are lengths in mm.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -220,7 +220,7 @@ impl Scanner {
         let mut by_parameters = [[0.0; PARAMETERS]; 2];
         let (reading, back, count) = if self.curved {
             let reading = self.correction.reading(place)?;
-            let Placed { by_reading, by_parameters: by, .. } = self.correction.linearize(reading);
+            let CorrectedPosition { by_reading, by_parameters: by, .. } = self.correction.linearize(reading);
             by_parameters = by;
             (reading, inverted(by_reading), PARAMETERS)
         } else {

@@ -216,8 +216,8 @@ impl Axes {
             return (Matrix3::identity(), Matrix3::zeros());
         }
         let of = |time: f64| self.of(positions.at(time));
-        let apart = |steps: f64| of(time + steps * STEP) - of(time - steps * STEP);
-        (of(time), (8.0 * apart(1.0) - apart(2.0)) / (12.0 * STEP))
+        let difference = |steps: f64| of(time + steps * STEP) - of(time - steps * STEP);
+        (of(time), (8.0 * difference(1.0) - difference(2.0)) / (12.0 * STEP))
     }
 
     fn of(&self, (place, velocity): (Vector3, Vector3)) -> Matrix3 {

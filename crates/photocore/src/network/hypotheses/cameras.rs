@@ -40,10 +40,10 @@ pub(super) fn equal_cameras(catalogue: &Catalogue<'_>) -> Vec<Vec<usize>> {
     let mut groups: Vec<(&'static str, Vec<f64>, Vec<usize>)> = vec![];
     for (photo, images) in bundle.images_on.iter().enumerate() {
         // What a scanned film sees is not the image of its camera.
-        if *images == 0 || !bundle.passages.is_empty() {
+        if *images == 0 || !bundle.image_corrections.is_empty() {
             continue;
         }
-        let camera = &catalogue.stations.photos[photo].camera;
+        let camera = &catalogue.linearization.photos[photo].camera;
         let (name, parameters) = (camera.name(), camera.parameters());
         match groups.iter().position(|own| own.0 == name && own.1 == parameters) {
             Some(place) => groups[place].2.push(photo),
@@ -57,7 +57,7 @@ pub(super) fn equal_cameras(catalogue: &Catalogue<'_>) -> Vec<Vec<usize>> {
 
 /// The parameters of a camera; the column of the principal distance, if it is fixed.
 fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos: &[usize]) -> Option<usize> {
-    let own: Camera = catalogue.stations.photos[photos[0]].camera.clone();
+    let own: Camera = catalogue.linearization.photos[photos[0]].camera.clone();
     let fixed = trial.fixed_parameters(photos[0], own.parameter_names().len());
     let fixed: Vec<(usize, &'static str)> =
         fixed.into_iter().map(|parameter| (parameter, own.parameter_names()[parameter].0)).collect();
@@ -114,7 +114,7 @@ fn of_camera(catalogue: &mut Catalogue<'_>, trial: &Trial, camera: usize, photos
 /// The principal distance, fixed or free, of the photos of a strip, of the first and the second half of the photos, and of one of several
 /// cameras with equal parameters.
 fn of_sets(catalogue: &mut Catalogue<'_>, trial: &Trial, photos: &[usize], whole: Option<usize>) {
-    let camera: Camera = catalogue.stations.photos[photos[0]].camera.clone();
+    let camera: Camera = catalogue.linearization.photos[photos[0]].camera.clone();
     let named = camera.parameter_names().iter().enumerate();
     let distances: Vec<usize> = named.filter(|own| DISTANCES.contains(&own.1.0)).map(|own| own.0).collect();
     let strips = &catalogue.facts.position_sets;
@@ -178,13 +178,13 @@ impl Catalogue<'_> {
     /// Appends the partials of both coordinates of an image by each tested parameter of its camera.
     fn write_camera_partials(&self, (image, local): (usize, usize), values: &mut Vec<f64>) {
         let observed = &self.bundle.images[image];
-        let station = &self.stations.photos[observed.photo];
-        let sight = match self.stations.plain {
-            false => self.bundle.sight_bent(&self.stations, image, local),
-            true => station.orientation.sight(&self.stations.points[local]),
+        let station = &self.linearization.photos[observed.photo];
+        let to_camera_frame = match self.linearization.plain {
+            false => self.bundle.corrected_sight(&self.linearization, image, local),
+            true => station.orientation.to_camera_frame(&self.linearization.points[local]),
         };
         each_camera!(&station.camera, camera => {
-            let (_, computed) = camera.compare(&sight, observed.xy);
+            let (_, computed) = camera.compare(&to_camera_frame, observed.xy);
             let by_parameters = computed.by_parameters.each_ref().map(|row| row.as_ref());
             for &(parameter, _) in &self.cameras[observed.photo] {
                 values.extend(by_parameters.map(|row| row[parameter]));

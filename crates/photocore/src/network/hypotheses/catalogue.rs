@@ -4,8 +4,8 @@ use std::collections::HashMap;
 
 use nalgebra::{DMatrix, Vector3};
 
+use super::super::linearization_point::LinearizationPoint;
 use super::super::model::{Bundle, Owner};
-use super::super::stations::Stations;
 use super::super::trial::Trial;
 use super::facts::Facts;
 use crate::adjustment::{AdditionalParameters, Equation, EquationOf, Leverages, Shared};
@@ -62,7 +62,7 @@ pub(super) struct Catalogue<'a> {
     pub causes: Vec<Cause>,
     pub bundle: &'a Bundle,
     layout: &'a Layout,
-    pub stations: Stations,
+    pub linearization: LinearizationPoint,
     pub facts: &'a Facts,
     /// Standard deviations of the unknowns.
     pub sd: &'a [f64],
@@ -95,7 +95,7 @@ impl<'a> Catalogue<'a> {
             causes: vec![],
             bundle,
             layout: problem.layout(),
-            stations: bundle.evaluated(&found.values),
+            linearization: bundle.evaluated(&found.values),
             facts,
             sd: &problem.sd,
             count: 0,

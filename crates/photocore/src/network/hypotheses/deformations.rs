@@ -13,7 +13,7 @@ const RADIAL: f64 = 5e-2;
 
 pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
     for photos in equal_cameras(catalogue).into_iter().take(MOST_CAMERAS) {
-        let camera = &catalogue.stations.photos[photos[0]].camera;
+        let camera = &catalogue.linearization.photos[photos[0]].camera;
         let (names, values, distance) = (camera.parameter_names(), camera.parameters(), camera.scale());
         // Images of cameras without a principal point are measured from it.
         let value = |axis: usize| {

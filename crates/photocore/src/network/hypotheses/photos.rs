@@ -10,7 +10,7 @@ const SHIFT: f64 = 0.1;
 pub(super) fn add(catalogue: &mut Catalogue<'_>, trial: &Trial) {
     let facts = catalogue.facts;
     // Image coordinates of a scanned film are not those of its camera.
-    for &photo in facts.photos.iter().filter(|_| catalogue.bundle.passages.is_empty()) {
+    for &photo in facts.photos.iter().filter(|_| catalogue.bundle.image_corrections.is_empty()) {
         let width = trial.camera_of_photo.get(photo).and_then(|&camera| facts.widths.get(camera)).copied();
         let Some(width) = width.filter(|width| width.is_finite() && catalogue.bundle.images_on[photo] > 0)
         else {

@@ -27,7 +27,7 @@ impl Place {
 impl Catalogue<'_> {
     /// A point of the model.
     pub fn place_of_point(&self, place: usize) -> Place {
-        let point = &self.stations.points[place];
+        let point = &self.linearization.points[place];
         self.place_at(self.bundle.of_point(place).start, point.position(), point.partials())
     }
 
@@ -66,12 +66,12 @@ impl Catalogue<'_> {
 
     /// The position of a photo.
     pub fn place_of_photo(&self, photo: usize) -> Place {
-        let own = &self.stations.photos[photo].orientation;
+        let own = &self.linearization.photos[photo].orientation;
         self.place_at(self.bundle.of_block(photo).start, own.centre(), own.centre_partials())
     }
 
     pub fn pose(&self, photo: usize) -> &Pose {
-        self.stations.photos[photo].orientation.pose()
+        self.linearization.photos[photo].orientation.pose()
     }
 
     /// The Cartesian position of coordinates, counted from the origin of the model.
@@ -85,7 +85,7 @@ impl Catalogue<'_> {
             (Some(centre), _) => self.position(centre),
             (None, ObjectSpace::Rectangular) => Vector3::zeros(),
             (None, ObjectSpace::Geographic(_)) => {
-                let photos = &self.stations.photos;
+                let photos = &self.linearization.photos;
                 let sum: Vector3<f64> = photos.iter().map(|own| own.orientation.centre()).sum();
                 sum / photos.len().max(1) as f64
             }

@@ -9,7 +9,7 @@ use crate::normals::GroupRows;
 
 /// Parameters of retained blocks with proportional partials of the pose: coefficients of a trajectory.
 #[derive(Debug, Clone, Default)]
-struct Alike {
+struct Proportional {
     /// Partials for a factor of one.
     steps: Steps,
     blocks: SmallVec<[(InBlock, f64); 4]>,
@@ -26,12 +26,12 @@ struct ChainBlock {
 
 /// A partially composed pose, with its partials by parameters of retained blocks.
 #[derive(Debug, Clone)]
-pub struct Chain {
+pub struct PartialPose {
     pose: Pose,
     /// Whether partials are requested.
     stepping: bool,
     /// Partials of the pose by parameters of retained blocks; only the first `used` elements are valid.
-    alike: Vec<Alike>,
+    proportional: Vec<Proportional>,
     used: usize,
 }
 
@@ -45,7 +45,7 @@ pub fn turning(turns: &Matrix3) -> impl Iterator<Item = (Vector3, Vector3)> {
     turns.column_iter().map(|own| (Vector3::zeros(), own.into()))
 }
 
-impl Chain {
+impl PartialPose {
     /// Returns true if partials are requested.
     pub fn steps(&self) -> bool {
         self.stepping
@@ -64,7 +64,7 @@ impl Chain {
     ) {
         let from = self.pose;
         let carried = from.carried(inner);
-        self.alike[..self.used].iter_mut().for_each(|all| all.steps.map(&carried));
+        self.proportional[..self.used].iter_mut().for_each(|all| all.steps.map(&carried));
         if let Some((block, steps)) = own {
             self.add([(block, 1.0)].into_iter(), steps.map(|(shift, rho)| (from.attitude * shift, rho)));
         }
@@ -83,10 +83,10 @@ impl Chain {
         blocks: impl Iterator<Item = (InBlock, f64)>,
         steps: impl IntoIterator<Item = (Vector3, Vector3)>,
     ) {
-        if self.used == self.alike.len() {
-            self.alike.push(Alike::default());
+        if self.used == self.proportional.len() {
+            self.proportional.push(Proportional::default());
         }
-        let own = &mut self.alike[self.used];
+        let own = &mut self.proportional[self.used];
         own.blocks.clear();
         own.blocks.extend(blocks);
         if !own.blocks.is_empty() {
@@ -95,13 +95,13 @@ impl Chain {
         }
     }
 
-    fn alike(&self) -> &[Alike] {
-        &self.alike[..self.used]
+    fn proportional(&self) -> &[Proportional] {
+        &self.proportional[..self.used]
     }
 
     /// Converts the partials from steps of the pose to parameters of an orientation.
     pub(super) fn lead_by(&mut self, unknowns: &Matrix6<f64>) {
-        self.alike[..self.used].iter_mut().for_each(|own| own.steps.lead_by(unknowns));
+        self.proportional[..self.used].iter_mut().for_each(|own| own.steps.lead_by(unknowns));
     }
 }
 
@@ -111,7 +111,7 @@ pub(in crate::network) struct Composed {
     /// Orientation with six parameters of its own: coordinates and a rotation about its axes.
     pub orientation: Orientation,
     /// Partials of these six parameters.
-    pub(super) chain: Chain,
+    pub(super) chain: PartialPose,
     /// Distinct blocks, the main block first, then in the order of the composition.
     slots: Vec<ChainBlock>,
     /// Slot of each block of the chain.
@@ -126,7 +126,7 @@ impl Composed {
         let pose = Pose { position: Vector3::zeros(), attitude: Matrix3::identity() };
         Self {
             orientation: Orientation::of_pose(ObjectSpace::Rectangular, &pose),
-            chain: Chain { pose, stepping, alike: vec![], used: 0 },
+            chain: PartialPose { pose, stepping, proportional: vec![], used: 0 },
             slots: vec![],
             numbers: vec![],
             width: 0,
@@ -139,7 +139,8 @@ impl Composed {
         self.slots.push(ChainBlock { block: main, width: POSE, first: 0 });
         self.numbers.clear();
         self.width = 0;
-        for &(InBlock { block, width, .. }, _) in self.chain.alike().iter().flat_map(|own| &own.blocks) {
+        for &(InBlock { block, width, .. }, _) in self.chain.proportional().iter().flat_map(|own| &own.blocks)
+        {
             let known = self.slots.iter().position(|slot| slot.block == block);
             self.numbers.push(known.unwrap_or(self.slots.len()));
             match known {
@@ -155,7 +156,7 @@ impl Composed {
 
     /// Returns the columns of all blocks, possibly with repeated blocks: block, number of the parameter and partials of the pose.
     pub fn columns(&self) -> impl Iterator<Item = (usize, usize, Vector6<f64>)> {
-        self.chain.alike().iter().flat_map(|own| {
+        self.chain.proportional().iter().flat_map(|own| {
             let of_block = |&(InBlock { block, first, .. }, factor): &(InBlock, f64)| {
                 let steps = (first..).zip(own.steps.columns());
                 steps.map(move |(k, step)| (block, k, factor * step))
@@ -193,7 +194,7 @@ impl Composed {
             let (others, own_camera) = rows.shared[common * row..][..common].split_at_mut(self.width);
             own_camera.copy_from_slice(&camera[parameters * row..][..parameters]);
             let mut numbers = self.numbers.iter();
-            for own in self.chain.alike() {
+            for own in self.chain.proportional() {
                 let by: SmallVec<[f64; POSE]> =
                     own.steps.columns().iter().map(|step| step.dot(&pose)).collect();
                 for (&(InBlock { first, .. }, factor), &number) in own.blocks.iter().zip(&mut numbers) {

@@ -13,8 +13,8 @@ use nalgebra::{Matrix3xX, Matrix6};
 use super::commons::{Common, CommonKind, CommonState, InBlock};
 use crate::geometry::{self, ObjectSpace, Orientation, POSE, Vector3};
 
-pub use chain::Chain;
 pub(super) use chain::Composed;
+pub use chain::PartialPose;
 
 /// Image number of the photo itself: times of images are relative to it (see [`OnTrajectory`]).
 pub(super) const AT_PHOTO: f64 = 0.0;
@@ -86,12 +86,12 @@ pub trait MountModel {
     fn is_timed(&self) -> bool;
 
     /// Returns velocity and rotation rate of the composed pose; None for a static one.
-    fn moving(&self, _at: f64, _grounds: &Grounds<'_>) -> Option<Moving> {
+    fn moving(&self, _at: f64, _grounds: &PoseInputs<'_>) -> Option<PhotoMotion> {
         None
     }
 
     /// Composes the preceding pose with the mount.
-    fn compose(&self, at: f64, grounds: &Grounds<'_>, pose: &mut Chain);
+    fn compose(&self, at: f64, pose_inputs: &PoseInputs<'_>, pose: &mut PartialPose);
 }
 
 macro_rules! kinds {
@@ -267,7 +267,7 @@ impl Mounts {
 
 /// Velocity and rotation rate of a photo on a trajectory, in the axes of the object space and of the photo.
 #[derive(Debug, Clone)]
-pub struct Moving {
+pub struct PhotoMotion {
     /// Velocity C' per second.
     pub velocity: Vector3,
     /// Rotation rate w in radians per second.
@@ -279,7 +279,7 @@ pub struct Moving {
 }
 
 /// Input of the composition of poses, at given parameter values.
-pub struct Grounds<'a> {
+pub struct PoseInputs<'a> {
     pub(super) space: ObjectSpace,
     pub(super) mounts: &'a Mounts,
     /// Orientations of photos from their own six parameters.
@@ -288,7 +288,7 @@ pub struct Grounds<'a> {
     pub(super) common: &'a dyn Fn(usize) -> (Cow<'a, CommonState>, Option<InBlock>),
 }
 
-impl Grounds<'_> {
+impl PoseInputs<'_> {
     /// Returns the trajectories and the given values.
     pub fn known(&self) -> &Mounts {
         self.mounts
@@ -324,7 +324,7 @@ impl Grounds<'_> {
     }
 
     /// Returns the motion of a photo; None unless its only mount is a trajectory.
-    pub(super) fn moving(&self, photo: usize, at: f64) -> Option<Moving> {
+    pub(super) fn moving(&self, photo: usize, at: f64) -> Option<PhotoMotion> {
         match self.mounts.of(photo) {
             [mount] => mount.moving(at, self),
             _ => None,
@@ -332,7 +332,7 @@ impl Grounds<'_> {
     }
 
     /// Composes a pose mount by mount.
-    fn lead(&self, photo: usize, at: f64, chain: &mut Chain) {
+    fn lead(&self, photo: usize, at: f64, chain: &mut PartialPose) {
         let carrier = self.mounts.carrier(photo);
         if carrier != photo {
             self.lead(carrier, at, chain);

@@ -1,6 +1,6 @@
 //! Rigs: several photos with individual poses on a common frame.
 
-use super::{Chain, Grounds, MountModel, Mounts};
+use super::{PartialPose, PoseInputs, MountModel, Mounts};
 use crate::network::commons::CommonKind;
 
 /// Mount of a photo that was taken by a sensor on a frame. Its pose is composed from the frame (the photo of the first sensor) and the
@@ -40,8 +40,8 @@ impl MountModel for OnFrame {
         false
     }
 
-    fn compose(&self, _: f64, grounds: &Grounds<'_>, pose: &mut Chain) {
-        let (sensor, block) = grounds.common(self.sensor);
+    fn compose(&self, _: f64, pose_inputs: &PoseInputs<'_>, pose: &mut PartialPose) {
+        let (sensor, block) = pose_inputs.common(self.sensor);
         let own = block.filter(|_| pose.steps()).map(|block| (block, sensor.steps()));
         pose.lead_to(&sensor.pose(), own);
     }

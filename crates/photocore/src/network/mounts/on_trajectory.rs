@@ -3,7 +3,7 @@
 use nalgebra::Matrix3xX;
 
 use super::chain::{shifting, turning};
-use super::{Chain, Grounds, MountModel, Mounts, Moving, Trajectory};
+use super::{PartialPose, PoseInputs, MountModel, Mounts, PhotoMotion, Trajectory};
 use crate::geometry::trajectory::{Flight, Motion};
 use crate::geometry::{Matrix3, Vector3};
 use crate::network::commons::CommonKind;
@@ -46,13 +46,13 @@ impl OnTrajectory {
     }
 
     /// Returns the time of an image.
-    fn time(&self, at: f64, grounds: &Grounds<'_>) -> f64 {
-        self.time_of(at, |common| grounds.common(common).0.vector().x)
+    fn time(&self, at: f64, pose_inputs: &PoseInputs<'_>) -> f64 {
+        self.time_of(at, |common| pose_inputs.common(common).0.vector().x)
     }
 
-    fn flown_at(&self, time: f64, grounds: &Grounds<'_>) -> Flight {
-        let Trajectory { course, position, rotation } = grounds.known().trajectory(self.trajectory);
-        let value = |all: &[usize], k: usize| grounds.common(all[k]).0.vector();
+    fn flown_at(&self, time: f64, pose_inputs: &PoseInputs<'_>) -> Flight {
+        let Trajectory { course, position, rotation } = pose_inputs.known().trajectory(self.trajectory);
+        let value = |all: &[usize], k: usize| pose_inputs.common(all[k]).0.vector();
         course.at(time, &|k| value(position, k), &|k| value(rotation, k))
     }
 
@@ -107,26 +107,26 @@ impl MountModel for OnTrajectory {
     }
 
     /// The partials by a clock offset are central differences over one millisecond.
-    fn moving(&self, at: f64, grounds: &Grounds<'_>) -> Option<Moving> {
+    fn moving(&self, at: f64, pose_inputs: &PoseInputs<'_>) -> Option<PhotoMotion> {
         const HALF: f64 = 5e-4;
-        let known = grounds.known();
+        let known = pose_inputs.known();
         let Trajectory { position, rotation, .. } = known.trajectory(self.trajectory);
-        let time = self.time(at, grounds);
-        let flight = self.flown_at(time, grounds);
-        let mut found = Moving {
+        let time = self.time(at, pose_inputs);
+        let flight = self.flown_at(time, pose_inputs);
+        let mut found = PhotoMotion {
             velocity: flight.motion.velocity,
             rate: flight.motion.rate,
             velocity_by: vec![],
             rate_by: vec![],
         };
-        let block = |common: usize| grounds.common(common).1;
+        let block = |common: usize| pose_inputs.common(common).1;
         let whole = |partials: &Matrix3| Matrix3xX::from_column_slice(partials.as_slice());
         let [p, r] = self.active(at, known);
         let by = p.filter_map(|k| Some((block(position[k])?, whole(&flight.velocity_by_position(k)))));
         found.velocity_by.extend(by);
         let by = r.filter_map(|k| Some((block(rotation[k])?, whole(&flight.rate_by_rotation(k)))));
         found.rate_by.extend(by);
-        let [before, after] = [-HALF, HALF].map(|step| self.flown_at(time + step, grounds).motion);
+        let [before, after] = [-HALF, HALF].map(|step| self.flown_at(time + step, pose_inputs).motion);
         for (common, times) in self.scaled(at) {
             let Some(block) = block(common) else { continue };
             let slope = |of: &dyn Fn(&Motion) -> Vector3| {
@@ -138,16 +138,16 @@ impl MountModel for OnTrajectory {
         Some(found)
     }
 
-    fn compose(&self, at: f64, grounds: &Grounds<'_>, pose: &mut Chain) {
-        let known = grounds.known();
+    fn compose(&self, at: f64, pose_inputs: &PoseInputs<'_>, pose: &mut PartialPose) {
+        let known = pose_inputs.known();
         let Trajectory { position, rotation, .. } = known.trajectory(self.trajectory);
-        let flight = self.flown_at(self.time(at, grounds), grounds);
+        let flight = self.flown_at(self.time(at, pose_inputs), pose_inputs);
         let Motion { velocity, rate, pose: reached } = flight.motion;
         pose.stand(reached);
         if !pose.steps() {
             return;
         }
-        let block = |common: usize| grounds.common(common).1;
+        let block = |common: usize| pose_inputs.common(common).1;
         let [p, r] = self.active(at, known);
         let of = |k: usize| Some((block(position[k])?, flight.position.value(k)));
         pose.add(p.filter_map(of), shifting(&flight.axes));

@@ -6,12 +6,12 @@ use std::borrow::Cow;
 
 use nalgebra::Vector6;
 
-use super::{Composed, Grounds, Mount, Mounts, Trajectory};
+use super::{Composed, Mount, Mounts, PoseInputs, Trajectory};
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::{
     Ellipsoid, Matrix3, ObjectSpace, Orientation, PoseNumbers, RotationSense, Vector3, rotation,
 };
-use crate::network::commons::{Common, CommonKind, InBlock, PlacedCommon};
+use crate::network::commons::{CartesianCommon, Common, CommonKind, InBlock};
 
 /// Returns the mounts of one mounted photo among `photos`.
 pub fn mounted(mount: Mount, photos: usize) -> Mounts {
@@ -43,8 +43,8 @@ fn agrees_at(
     };
     let given: Vec<Common> = kinds.iter().enumerate().map(common).collect();
     let mounts = Mounts::new((&[mount], 2), (trajectories, [0.0; 3]), &given);
-    let placed = |common| PlacedCommon::new(common, space, [0.0; 3], &Matrix3::identity());
-    let commons: Vec<PlacedCommon> = given.iter().map(placed).collect();
+    let placed = |common| CartesianCommon::new(common, space, [0.0; 3], &Matrix3::identity());
+    let commons: Vec<CartesianCommon> = given.iter().map(placed).collect();
     let widths: Vec<usize> = [6, 6].into_iter().chain(given.iter().map(|own| own.sd.len())).collect();
     let first = |block: usize| widths[..block].iter().sum::<usize>();
     let photos = vec![0.31, 0.7, 2.0, 0.4, -0.3, 1.2, 0.3, 0.69, 1.5, 1.1, 0.5, -0.7];
@@ -60,7 +60,7 @@ fn agrees_at(
                 Some(InBlock::whole(block, widths[block])),
             )
         };
-        Grounds { space, mounts: &mounts, photo: &photo, common: &common }.composed(0, at).unwrap()
+        PoseInputs { space, mounts: &mounts, photo: &photo, common: &common }.composed(0, at).unwrap()
     };
     let found = composed(&values);
     let (orientation, parts) = (found.orientation, found.parts());
@@ -68,7 +68,7 @@ fn agrees_at(
     for (block, steps) in &parts {
         for (k, step) in steps.column_iter().enumerate() {
             let unknown = first(*block) + k;
-            let apart = |times: f64| {
+            let difference = |times: f64| {
                 let mut moved = values.clone();
                 moved[unknown] += 1e-3 * times;
                 let moved = *composed(&moved).orientation.pose();
@@ -76,7 +76,8 @@ fn agrees_at(
                 let rho: Vector3 = rotation_angle_axis(&pose.attitude.tr_mul(&moved.attitude));
                 Vector6::new(shift.x, shift.y, shift.z, rho.x, rho.y, rho.z)
             };
-            let difference = 8.0 * (apart(1.0) - apart(-1.0)) - (apart(2.0) - apart(-2.0));
+            let difference =
+                8.0 * (difference(1.0) - difference(-1.0)) - (difference(2.0) - difference(-2.0));
             let expected = unknowns * difference / 12e-3;
             let error = (step - expected).amax() / expected.amax().max(1.0);
             assert!(error < 1e-9, "{space:?}, {at}, block {block}, unknown {k}: {error:e}");

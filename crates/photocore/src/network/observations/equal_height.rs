@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Named, ObservationModel, Rows, Sites, Touches, deviation};
+use super::{Named, ObservationModel, Rows, ObservationInputs, Touches, deviation};
 
 /// Two points of equal height, or with a levelled height difference.
 ///
@@ -27,14 +27,14 @@ impl ObservationModel for EqualHeight {
         Touches::points(&self.points)
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        rows.residual(0, &[self.difference - (sites.height(1) - sites.height(0))]);
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        rows.residual(0, &[self.difference - (inputs.height(1) - inputs.height(0))]);
         rows.by_height(0, 0, -1.0);
         rows.by_height(0, 1, 1.0);
     }
 
-    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
-        sites.up()
+    fn axes(&self, inputs: &ObservationInputs<'_>) -> Option<DMatrix<f64>> {
+        inputs.up()
     }
 }
 

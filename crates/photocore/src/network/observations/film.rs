@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::{Fault, Named, ObservationModel, Precision, Rows, Sites, Touches};
+use super::{Fault, Named, ObservationModel, Precision, Rows, ObservationInputs, Touches};
 use crate::network::commons::CommonKind;
 use crate::network::film::{FilmOf, Read};
 
@@ -53,14 +53,14 @@ impl ObservationModel for Film {
         self.components.len()
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
         for (row, (&component, observed)) in self.components.iter().zip(&self.observed).enumerate() {
             let (common, axis) = (component / 3, component % 3);
             let along = Vector3::ith(axis, 1.0).transpose();
-            let mut computed = sites.common(common).vector()[axis];
+            let mut computed = inputs.common(common).vector()[axis];
             rows.by_offset(row, common, &along);
             if component == MEAN && self.roll.is_some() {
-                computed -= sites.common(2).vector().x;
+                computed -= inputs.common(2).vector().x;
                 rows.by_offset(row, 2, &-Vector3::x().transpose());
             }
             rows.residual(row, &[observed - computed]);
@@ -92,7 +92,7 @@ pub struct Fiducial {
 impl ObservationModel for Fiducial {
     const ROWS: usize = 2;
 
-    /// Indices: mark, then film (see [`crate::network::Passage`]); values: reading, approximate position, numbers of the film.
+    /// Indices: mark, then film (see [`crate::network::ImageCorrection`]); values: reading, approximate position, numbers of the film.
     fn from_numbers(of: &Named<'_>, values: &[f64], covariance: DMatrix<f64>) -> Option<Self> {
         let commons: Vec<usize> = of.commons.iter().copied().collect::<Option<_>>()?;
         let (&[x, y, near_x, near_y], film) = values.split_first_chunk()?;
@@ -112,12 +112,12 @@ impl ObservationModel for Fiducial {
         Touches { commons: all.map(|(own, kind)| (own, Some(kind))).collect(), ..Touches::default() }
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
         let cell = self.film.cell(self.near);
         let commons = self.film.commons(cell);
         let numbered = |own: usize| commons.iter().position(|&(common, _)| common == own);
-        let mark = sites.common(commons.len()).vector();
-        let film = self.film.at(&|own| Some(sites.common(numbered(own)?).vector()));
+        let mark = inputs.common(commons.len()).vector();
+        let film = self.film.at(&|own| Some(inputs.common(numbered(own)?).vector()));
         let mut read = Read::default();
         film.read([mark.x, mark.y], cell, &mut read);
         let residual = [0, 1].map(|k| self.reading[k] - read.reading.xy[k]);

@@ -9,9 +9,9 @@ use super::rows::{CommonSite, PhotoSite, PointSite};
 use super::tied::TiedModel;
 use super::{Named, Observation, TiedObservation};
 use crate::geometry::{Camera, Matrix3, ObjectSpace, Orientation, Perspective, Point, Vector3};
-use crate::network::commons::{Common, CommonKind, CommonState, InBlock, PlacedCommon};
+use crate::network::commons::{CartesianCommon, Common, CommonKind, CommonState, InBlock};
 use crate::network::mounts::tests::mounted;
-use crate::network::mounts::{AT_PHOTO, Grounds, OnFrame};
+use crate::network::mounts::{AT_PHOTO, OnFrame, PoseInputs};
 
 #[path = "../../../tests/golden/mod.rs"]
 mod data;
@@ -32,7 +32,7 @@ fn orientation(block: &Value) -> Orientation {
 fn state(kind: CommonKind, position: [f64; 3], attitude: Matrix3) -> CommonState {
     let sd = vec![1.0; kind.unknowns().len()];
     let common = Common { kind, position, attitude, sd };
-    PlacedCommon::new(&common, SPACE, [0.0; 3], &Matrix3::identity()).at(&vec![0.0; common.sd.len()])
+    CartesianCommon::new(&common, SPACE, [0.0; 3], &Matrix3::identity()).at(&vec![0.0; common.sd.len()])
 }
 
 /// Returns the shared parameter of a block in a case, and the matching columns of its partials with their signs.
@@ -175,12 +175,12 @@ fn assert_rig(case: &Value) {
     let sensor = state(CommonKind::Sensor, in_frame, matrix(&blocks[1]["matrix_photo_to_object"]));
     let mounts = mounted(OnFrame { photo: 1, frame: 0, sensor: 0 }.into(), 2);
     let common = |_| (std::borrow::Cow::Borrowed(&sensor), Some(InBlock::whole(2, 6)));
-    let grounds = Grounds { space: SPACE, mounts: &mounts, photo: &|_| frame, common: &common };
-    let composed = grounds.composed(1, AT_PHOTO).unwrap();
+    let pose_inputs = PoseInputs { space: SPACE, mounts: &mounts, photo: &|_| frame, common: &common };
+    let composed = pose_inputs.composed(1, AT_PHOTO).unwrap();
     let (photo, parts) = (composed.orientation, composed.parts());
     let point = Point::new(SPACE, list(&blocks[2]["value"]).try_into().unwrap());
     let camera = Camera::from(Perspective { principal_distance: case["c"].as_f64().unwrap() });
-    let u = photo.sight(&point);
+    let u = photo.to_camera_frame(&point);
     let image = camera.image(&u);
     let Camera::Perspective(own) = camera else { return };
     let found = photo.projection(&u, &crate::geometry::CameraModel::linearize(&own, &u), &point);

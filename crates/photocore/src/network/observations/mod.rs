@@ -20,7 +20,7 @@ pub use model::{Named, ObservationModel, Quantity, Touches};
 pub(super) use photos::misalignment;
 pub use precision::{Fault, Precision};
 pub(super) use rows::{CommonSite, PhotoSite, PointSite};
-pub use rows::{Rows, Sites};
+pub use rows::{ObservationInputs, Rows};
 pub(super) use tied::{LOCAL, Linear, TiedModel, TiedObservation};
 
 macro_rules! kinds {
@@ -131,8 +131,8 @@ impl Observation {
         each_observation!(self, own => own.rows())
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        each_observation!(self, own => own.write(sites, rows));
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        each_observation!(self, own => own.write(inputs, rows));
     }
 
     /// See [`ObservationModel::moves`].
@@ -140,8 +140,8 @@ impl Observation {
         each_observation!(self, own => own.moves())
     }
 
-    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
-        each_observation!(self, own => own.axes(sites))
+    fn axes(&self, inputs: &ObservationInputs<'_>) -> Option<DMatrix<f64>> {
+        each_observation!(self, own => own.axes(inputs))
     }
 
     /// Returns an error if the observation is invalid or does not fit the points, photos and shared parameters of the network.

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, RowVector3, SMatrix, SVector};
 
 use super::precision::Fault;
-use super::rows::{Rows, Sites};
+use super::rows::{ObservationInputs, Rows};
 use crate::geometry::{Matrix3, Vector3};
 use crate::network::commons::CommonKind;
 
@@ -18,7 +18,7 @@ pub trait ObservationModel: Sized {
     /// Returns points, photos and shared parameters; [`ObservationModel::write`] refers to them by their index in these lists.
     fn touches(&self) -> Touches;
 
-    /// Returns true if the observation depends on the motion of a photo on a trajectory: [`Sites::moving`].
+    /// Returns true if the observation depends on the motion of a photo on a trajectory: [`ObservationInputs::moving`].
     fn moves(&self) -> bool {
         false
     }
@@ -34,11 +34,11 @@ pub trait ObservationModel: Sized {
     }
 
     /// Writes observed minus computed, and the partials of the computed values.
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>);
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>);
 
     /// Returns, as rows, the axes of observed minus computed if it is a displacement of a position; None otherwise. A displacement is
     /// transformed with the network and does not define its datum (see [`crate::adjustment::Evaluated::carried`]).
-    fn axes(&self, _sites: &Sites<'_>) -> Option<DMatrix<f64>> {
+    fn axes(&self, _sites: &ObservationInputs<'_>) -> Option<DMatrix<f64>> {
         None
     }
 
@@ -149,13 +149,13 @@ pub(super) fn deviation(covariance: &DMatrix<f64>) -> f64 {
 
 /// Writes the residual of an observed length of a vector, and its partials by an instrument. Returns the partials by the vector, m e.
 pub(super) fn length(
-    sites: &Sites<'_>,
+    inputs: &ObservationInputs<'_>,
     rows: &mut Rows<'_>,
     vector: &Vector3,
     (observed, instrument): (f64, Option<usize>),
 ) -> RowVector3<f64> {
     let length = vector.norm();
-    let instrument = instrument.map(|_| sites.common(0).vector());
+    let instrument = instrument.map(|_| inputs.common(0).vector());
     let (scale, constant) = instrument.map_or((1.0, 0.0), |own| (own.x, own.y));
     rows.residual(0, &[observed - scale * length - constant]);
     if instrument.is_some() {
@@ -168,13 +168,13 @@ pub(super) fn length(
 ///
 /// own = R^T (P - p_0), with the partials R^T by P, and `[own]x` by a rotation of the axes about themselves.
 pub(super) fn in_own_axes<const N: usize>(
-    sites: &Sites<'_>,
+    inputs: &ObservationInputs<'_>,
     rows: &mut Rows<'_>,
     selected: &SMatrix<f64, N, 3>,
     observed: &[f64; N],
 ) {
-    let common = sites.common(0);
-    let own = common.own(&sites.position(0));
+    let common = inputs.common(0);
+    let own = common.own(&inputs.position(0));
     let residual = SVector::from(*observed) - selected * (own - common.offset());
     rows.residual(0, residual.as_slice());
     rows.by_position(0, 0, &(selected * common.attitude().transpose()));
@@ -184,10 +184,10 @@ pub(super) fn in_own_axes<const N: usize>(
 
 /// Returns [`ObservationModel::axes`] of a point in some of the own axes of a plane or line.
 pub(super) fn own_axes<const N: usize>(
-    sites: &Sites<'_>,
+    inputs: &ObservationInputs<'_>,
     selected: &SMatrix<f64, N, 3>,
 ) -> Option<DMatrix<f64>> {
-    rows_of(&(selected * sites.common(0).attitude().transpose()))
+    rows_of(&(selected * inputs.common(0).attitude().transpose()))
 }
 
 /// Returns axes as rows.

@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 
 use super::{
-    CommonKind, Fault, Named, ObservationModel, Precision, Quantity, Rows, Sites, Touches, nine, rotates,
+    CommonKind, Fault, Named, ObservationModel, Precision, Quantity, Rows, ObservationInputs, Touches, nine, rotates,
     three,
 };
 use crate::geometry::{Matrix3, Vector3};
@@ -42,10 +42,10 @@ impl ObservationModel for Velocity {
         true
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        let Some(moving) = sites.moving(0) else { return };
-        let attitude = sites.pose(0).attitude;
-        let lever_arm = self.lever_arm.value(|_| sites.common(0).vector());
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        let Some(moving) = inputs.moving(0) else { return };
+        let attitude = inputs.pose(0).attitude;
+        let lever_arm = self.lever_arm.value(|_| inputs.common(0).vector());
         let around = moving.rate.cross(&lever_arm);
         let computed = moving.velocity + attitude * around;
         rows.residual(0, (Vector3::from(self.velocity) - computed).as_slice());
@@ -96,9 +96,9 @@ impl ObservationModel for Rate {
         true
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        let Some(moving) = sites.moving(0) else { return };
-        let boresight = self.boresight.value(|_| *sites.common(0).attitude());
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        let Some(moving) = inputs.moving(0) else { return };
+        let boresight = self.boresight.value(|_| *inputs.common(0).attitude());
         let bias = usize::from(self.boresight.common().is_some());
         let mut computed = boresight.tr_mul(&moving.rate);
         rows.by_rate(0, 0, &boresight.transpose());
@@ -106,7 +106,7 @@ impl ObservationModel for Rate {
             rows.by_turn(0, 0, &computed.cross_matrix());
         }
         if self.bias.is_some() {
-            computed += sites.common(bias).vector();
+            computed += inputs.common(bias).vector();
             rows.by_offset(0, bias, &Matrix3::identity());
         }
         rows.residual(0, (Vector3::from(self.rate) - computed).as_slice());
@@ -148,10 +148,10 @@ impl ObservationModel for Smoothness {
         Touches { commons: self.coefficients.iter().map(|&own| (own, None)).collect(), ..Touches::default() }
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
         let mut missing = Vector3::from(self.observed);
         for (k, &factor) in self.factors.iter().enumerate() {
-            missing -= factor * sites.common(k).vector();
+            missing -= factor * inputs.common(k).vector();
             rows.by_offset(0, k, &Matrix3::from_diagonal_element(factor));
         }
         rows.residual(0, missing.as_slice());

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, Matrix2x3, RowVector3};
 
 use super::{
-    CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation, in_own_axes, own_axes,
+    CommonKind, Named, ObservationModel, Precision, Rows, ObservationInputs, Touches, deviation, in_own_axes, own_axes,
 };
 
 /// A point on a plane, or at a given distance from it; its standard deviation is the flatness of the plane.
@@ -32,12 +32,12 @@ impl ObservationModel for OnPlane {
         Touches::points(&[self.point]).and(Some(self.plane), CommonKind::Plane)
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        in_own_axes(sites, rows, &RowVector3::new(0.0, 0.0, 1.0), &[self.distance]);
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        in_own_axes(inputs, rows, &RowVector3::new(0.0, 0.0, 1.0), &[self.distance]);
     }
 
-    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
-        own_axes(sites, &RowVector3::new(0.0, 0.0, 1.0))
+    fn axes(&self, inputs: &ObservationInputs<'_>) -> Option<DMatrix<f64>> {
+        own_axes(inputs, &RowVector3::new(0.0, 0.0, 1.0))
     }
 }
 
@@ -67,14 +67,14 @@ impl ObservationModel for OnLevel {
         Touches::points(&[self.point]).and(Some(self.level), CommonKind::Level)
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        rows.residual(0, &[self.difference - (sites.height(0) - sites.common(0).height())]);
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        rows.residual(0, &[self.difference - (inputs.height(0) - inputs.common(0).height())]);
         rows.by_height(0, 0, 1.0);
         rows.by_offset(0, 0, &RowVector3::new(0.0, 0.0, -1.0));
     }
 
-    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
-        sites.up()
+    fn axes(&self, inputs: &ObservationInputs<'_>) -> Option<DMatrix<f64>> {
+        inputs.up()
     }
 }
 
@@ -104,12 +104,12 @@ macro_rules! on_lines {
                 Touches::points(&[self.point]).and(Some(self.line), CommonKind::$kind)
             }
 
-            fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-                in_own_axes(sites, rows, &Matrix2x3::identity(), &[0.0; 2]);
+            fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+                in_own_axes(inputs, rows, &Matrix2x3::identity(), &[0.0; 2]);
             }
 
-            fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
-                own_axes(sites, &Matrix2x3::identity())
+            fn axes(&self, inputs: &ObservationInputs<'_>) -> Option<DMatrix<f64>> {
+                own_axes(inputs, &Matrix2x3::identity())
             }
         }
     )*};

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, SMatrix};
 
 use super::{
-    CommonKind, Fault, Named, ObservationModel, Precision, Quantity, Rows, Sites, Touches, deviation, length,
+    CommonKind, Fault, Named, ObservationModel, Precision, Quantity, Rows, ObservationInputs, Touches, deviation, length,
     nine, rotates, rows_of, three,
 };
 use crate::geometry::angle_axis::{right_jacobian_inverse, rotation_angle_axis};
@@ -63,10 +63,10 @@ impl ObservationModel for Position {
             .and(self.drift, CommonKind::Drift)
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        let pose = sites.pose(0);
-        let (observed, axes) = sites.observed(self.coordinates);
-        let lever_arm = self.lever_arm.value(|_| sites.common(0).vector());
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        let pose = inputs.pose(0);
+        let (observed, axes) = inputs.observed(self.coordinates);
+        let lever_arm = self.lever_arm.value(|_| inputs.common(0).vector());
         let mut computed = pose.position + pose.attitude * lever_arm;
         rows.by_centre(0, 0, &axes);
         rows.by_rotation(0, 0, &(-axes * pose.attitude * lever_arm.cross_matrix()));
@@ -76,7 +76,7 @@ impl ObservationModel for Position {
             place = 1;
         }
         for factor in [self.shift.map(|_| 1.0), self.drift.map(|_| self.time)].into_iter().flatten() {
-            let own = sites.common(place);
+            let own = inputs.common(place);
             computed += factor * own.attitude() * own.vector();
             rows.by_offset(0, place, &(factor * axes * own.attitude()));
             place += 1;
@@ -85,8 +85,8 @@ impl ObservationModel for Position {
     }
 
     /// The displacement absorbed by a drift depends on the positions of all antennas.
-    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
-        self.drift.is_none().then(|| sites.observed(self.coordinates).1).and_then(|axes| rows_of(&axes))
+    fn axes(&self, inputs: &ObservationInputs<'_>) -> Option<DMatrix<f64>> {
+        self.drift.is_none().then(|| inputs.observed(self.coordinates).1).and_then(|axes| rows_of(&axes))
     }
 }
 
@@ -126,9 +126,9 @@ impl ObservationModel for Attitude {
         Touches::photos(&[self.photo]).and(self.boresight.common(), CommonKind::Boresight)
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        let boresight = self.boresight.value(|_| *sites.common(0).attitude());
-        let computed = sites.local_attitude(0) * boresight;
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        let boresight = self.boresight.value(|_| *inputs.common(0).attitude());
+        let computed = inputs.local_attitude(0) * boresight;
         let (residual, jacobian) = misalignment(&computed, &self.attitude);
         rows.residual(0, residual.as_slice());
         rows.by_local_rotation(0, 0, &(jacobian * boresight.transpose()));
@@ -177,10 +177,10 @@ impl ObservationModel for Relative {
         Touches::photos(&self.photos)
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        let (first, second) = (sites.pose(0), sites.pose(1));
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        let (first, second) = (inputs.pose(0), inputs.pose(1));
         let to_first: Matrix3 = first.attitude.transpose();
-        let translation = first.sight(&second.position);
+        let translation = first.to_camera_frame(&second.position);
         rows.residual(0, (self.pose.position - translation).as_slice());
         rows.by_centre(0, 0, &-to_first);
         rows.by_rotation(0, 0, &translation.cross_matrix());
@@ -230,10 +230,10 @@ impl ObservationModel for Range {
         Touches { photos, ..Touches::points(&[self.point]) }.and(self.instrument, CommonKind::Instrument)
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        let pose = sites.pose(0);
-        let ray = sites.position(0) - pose.position - pose.attitude * self.lever_arm;
-        let direction = length(sites, rows, &ray, (self.length, self.instrument));
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        let pose = inputs.pose(0);
+        let ray = inputs.position(0) - pose.position - pose.attitude * self.lever_arm;
+        let direction = length(inputs, rows, &ray, (self.length, self.instrument));
         rows.by_position(0, 0, &direction);
         rows.by_centre(0, 0, &-direction);
         rows.by_rotation(0, 0, &(direction * pose.attitude * self.lever_arm.cross_matrix()));

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, SMatrix};
 
 use super::{
-    CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation, length, rows_of, three,
+    CommonKind, Named, ObservationModel, Precision, Rows, ObservationInputs, Touches, deviation, length, rows_of, three,
 };
 use crate::geometry::Matrix3;
 
@@ -32,14 +32,14 @@ impl ObservationModel for Control {
         Touches::points(&[self.point])
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        let (observed, axes) = sites.observed(self.coordinates);
-        rows.residual(0, (axes * (observed - sites.position(0))).as_slice());
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        let (observed, axes) = inputs.observed(self.coordinates);
+        rows.residual(0, (axes * (observed - inputs.position(0))).as_slice());
         rows.by_position(0, 0, &axes);
     }
 
-    fn axes(&self, sites: &Sites<'_>) -> Option<DMatrix<f64>> {
-        rows_of(&sites.observed(self.coordinates).1)
+    fn axes(&self, inputs: &ObservationInputs<'_>) -> Option<DMatrix<f64>> {
+        rows_of(&inputs.observed(self.coordinates).1)
     }
 }
 
@@ -69,9 +69,9 @@ impl ObservationModel for Distance {
         Touches::points(&self.points).and(self.instrument, CommonKind::Instrument)
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        let difference = sites.position(1) - sites.position(0);
-        let direction = length(sites, rows, &difference, (self.length, self.instrument));
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        let difference = inputs.position(1) - inputs.position(0);
+        let direction = length(inputs, rows, &difference, (self.length, self.instrument));
         rows.by_position(0, 0, &-direction);
         rows.by_position(0, 1, &direction);
     }
@@ -111,8 +111,8 @@ impl ObservationModel for Difference {
         self.components.iter().flatten().count()
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        let difference = sites.position(1) - sites.position(0);
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        let difference = inputs.position(1) - inputs.position(0);
         let observed = (0..3).filter_map(|k| self.components[k].map(|value| (k, value)));
         for (row, (k, value)) in observed.enumerate() {
             let axis: SMatrix<f64, 1, 3> = Matrix3::identity().row(k).into();
@@ -122,7 +122,7 @@ impl ObservationModel for Difference {
         }
     }
 
-    fn axes(&self, _: &Sites<'_>) -> Option<DMatrix<f64>> {
+    fn axes(&self, _: &ObservationInputs<'_>) -> Option<DMatrix<f64>> {
         let observed: Vec<usize> = (0..3).filter(|&k| self.components[k].is_some()).collect();
         Some(DMatrix::from_fn(observed.len(), 3, |row, k| f64::from(u8::from(observed[row] == k))))
     }

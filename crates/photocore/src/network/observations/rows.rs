@@ -4,18 +4,18 @@ use nalgebra::{DMatrix, Matrix3xX, SMatrix};
 
 use crate::geometry::{Matrix3, ObjectSpace, Orientation, POSE, Point, Pose, Vector3, local_vertical};
 use crate::network::commons::{CommonState, InBlock};
-use crate::network::mounts::{Composed, Moving};
+use crate::network::mounts::{Composed, PhotoMotion};
 
 /// Points, photos and shared parameters of an observation at given values, by their index in [`super::Touches`]. Cartesian positions are
 /// relative to an origin near the centre of the network.
 #[derive(Debug)]
-pub struct Sites<'a> {
+pub struct ObservationInputs<'a> {
     pub(super) space: ObjectSpace,
     pub(super) origin: [f64; 3],
     pub(super) points: Vec<PointSite>,
     pub(super) photos: Vec<PhotoSite<'a>>,
     /// Motion of the photos, if required.
-    pub(super) moving: Vec<Option<Moving>>,
+    pub(super) moving: Vec<Option<PhotoMotion>>,
     pub(super) commons: Vec<CommonSite<'a>>,
 }
 
@@ -42,7 +42,7 @@ pub(in crate::network) struct CommonSite<'a> {
     pub place: Option<InBlock>,
 }
 
-impl Sites<'_> {
+impl ObservationInputs<'_> {
     /// Returns the Cartesian position of a point.
     pub fn position(&self, point: usize) -> Vector3 {
         self.points[point].point.position()
@@ -65,7 +65,7 @@ impl Sites<'_> {
     }
 
     /// Returns the motion of a photo; None without a trajectory.
-    pub fn moving(&self, photo: usize) -> Option<&Moving> {
+    pub fn moving(&self, photo: usize) -> Option<&PhotoMotion> {
         self.moving.get(photo)?.as_ref()
     }
 
@@ -102,7 +102,7 @@ impl Sites<'_> {
 /// Equations of an observation, initially zero; partials are accumulated.
 #[derive(Debug)]
 pub struct Rows<'a> {
-    pub(super) sites: &'a Sites<'a>,
+    pub(super) inputs: &'a ObservationInputs<'a>,
     /// Blocks of the observation, with the first column of each.
     pub(super) columns: &'a [(usize, usize)],
     /// Total number of columns.
@@ -119,42 +119,42 @@ impl Rows<'_> {
 
     /// Adds partials of rows, from `row` on, by the Cartesian position of a point.
     pub fn by_position<const N: usize>(&mut self, row: usize, point: usize, partials: &SMatrix<f64, N, 3>) {
-        let PointSite { point, block, .. } = self.sites.points[point];
+        let PointSite { point, block, .. } = self.inputs.points[point];
         let by_coordinates = partials * point.partials();
         for k in 0..3 {
             self.add(row, block, k, by_coordinates.column(k).iter());
         }
     }
 
-    /// Adds the partial of a row by the height of a point (see [`Sites::height`]).
+    /// Adds the partial of a row by the height of a point (see [`ObservationInputs::height`]).
     pub fn by_height(&mut self, row: usize, point: usize, partial: f64) {
-        self.add(row, self.sites.points[point].block, 2, [partial].iter());
+        self.add(row, self.inputs.points[point].block, 2, [partial].iter());
     }
 
     /// Adds partials of rows by the Cartesian position of the projection centre of a photo.
     pub fn by_centre<const N: usize>(&mut self, row: usize, photo: usize, partials: &SMatrix<f64, N, 3>) {
-        let steps = self.sites.photos[photo].orientation.steps();
+        let steps = self.inputs.photos[photo].orientation.steps();
         self.by_pose(row, photo, steps.map(|(shift, _)| partials * shift));
     }
 
     /// Adds partials of rows by the rotation step rho of a photo about its own axes, A <- A Exp(rho).
     pub fn by_rotation<const N: usize>(&mut self, row: usize, photo: usize, partials: &SMatrix<f64, N, 3>) {
-        let steps = self.sites.photos[photo].orientation.steps();
+        let steps = self.inputs.photos[photo].orientation.steps();
         self.by_pose(row, photo, steps.map(|(_, turn)| partials * turn));
     }
 
-    /// Adds the same partials for [`Sites::local_attitude`], which in geographic space does not rotate with the position.
+    /// Adds the same partials for [`ObservationInputs::local_attitude`], which in geographic space does not rotate with the position.
     pub fn by_local_rotation<const N: usize>(
         &mut self,
         row: usize,
         photo: usize,
         partials: &SMatrix<f64, N, 3>,
     ) {
-        let turning = match self.sites.space {
+        let turning = match self.inputs.space {
             ObjectSpace::Rectangular => 0,
             ObjectSpace::Geographic(_) => 3,
         };
-        let mut by_pose = self.sites.photos[photo].orientation.steps().map(|(_, turn)| partials * turn);
+        let mut by_pose = self.inputs.photos[photo].orientation.steps().map(|(_, turn)| partials * turn);
         by_pose[..turning].fill(SMatrix::zeros());
         self.by_pose(row, photo, by_pose);
     }
@@ -170,8 +170,8 @@ impl Rows<'_> {
     }
 
     /// Adds unit partials of rows that are the components of a shared parameter themselves.
-    pub fn by_itself(&mut self, row: usize, common: usize, count: usize) {
-        let Some(InBlock { block, first, .. }) = self.sites.commons[common].place else { return };
+    pub fn add_identity(&mut self, row: usize, common: usize, count: usize) {
+        let Some(InBlock { block, first, .. }) = self.inputs.commons[common].place else { return };
         (0..count).for_each(|k| self.add(row + k, block, first + k, [1.0].iter()));
     }
 
@@ -181,21 +181,21 @@ impl Rows<'_> {
         common: usize,
         partials: impl Fn((Vector3, Vector3)) -> SMatrix<f64, N, 1>,
     ) {
-        let CommonSite { state, place } = self.sites.commons[common];
+        let CommonSite { state, place } = self.inputs.commons[common];
         let Some(InBlock { block, first, .. }) = place else { return };
         for (k, step) in (first..).zip(state.steps()) {
             self.add(row, block, k, partials(step).iter());
         }
     }
 
-    /// Adds partials of rows by the velocity of a photo (see [`Sites::moving`]).
+    /// Adds partials of rows by the velocity of a photo (see [`ObservationInputs::moving`]).
     pub fn by_velocity<const N: usize>(&mut self, row: usize, photo: usize, partials: &SMatrix<f64, N, 3>) {
-        self.by_motion(row, self.sites.moving(photo).map(|own| &own.velocity_by), partials);
+        self.by_motion(row, self.inputs.moving(photo).map(|own| &own.velocity_by), partials);
     }
 
     /// Adds partials of rows by the rotation rate of a photo.
     pub fn by_rate<const N: usize>(&mut self, row: usize, photo: usize, partials: &SMatrix<f64, N, 3>) {
-        self.by_motion(row, self.sites.moving(photo).map(|own| &own.rate_by), partials);
+        self.by_motion(row, self.inputs.moving(photo).map(|own| &own.rate_by), partials);
     }
 
     fn by_motion<const N: usize>(
@@ -212,7 +212,7 @@ impl Rows<'_> {
     }
 
     fn by_pose<const N: usize>(&mut self, row: usize, photo: usize, partials: [SMatrix<f64, N, 1>; POSE]) {
-        let PhotoSite { block, made_of, .. } = self.sites.photos[photo];
+        let PhotoSite { block, made_of, .. } = self.inputs.photos[photo];
         let Some(composed) = made_of else {
             for (k, partials) in partials.iter().enumerate() {
                 self.add(row, block, k, partials.iter());

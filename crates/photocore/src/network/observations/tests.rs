@@ -13,10 +13,10 @@ use crate::geometry::film::Pattern;
 use crate::geometry::{
     Ellipsoid, Matrix3, ObjectSpace, Orientation, Point, Pose, PoseNumbers, RotationSense, Vector3, rotation,
 };
-use crate::network::commons::{CommonState, InBlock, PlacedCommon};
+use crate::network::commons::{CartesianCommon, CommonState, InBlock};
 use crate::network::film::{FilmOf, Readings};
 use crate::network::mounts::tests::mounted;
-use crate::network::mounts::{AT_PHOTO, Composed, Grounds, OnFrame};
+use crate::network::mounts::{AT_PHOTO, Composed, OnFrame, PoseInputs};
 
 /// Two points or photos in rectangular space.
 const PLACES: [[f64; 3]; 2] = [[10.0, 20.0, 1.5], [13.0, 18.5, 2.0]];
@@ -50,17 +50,17 @@ struct Scene {
     unknowns: Vec<f64>,
     /// Approximate unit of each parameter in units of length or radians.
     units: Vec<f64>,
-    commons: Vec<PlacedCommon>,
+    commons: Vec<CartesianCommon>,
     /// Whether the second photo is on the frame of the first, with the first sensor.
     rig: bool,
 }
 
-fn width(common: &PlacedCommon) -> usize {
+fn width(common: &CartesianCommon) -> usize {
     common.kind.unknowns().len()
 }
 
 /// Returns shared parameters of all types, near a given position.
-fn commons(space: ObjectSpace, [x, y, z]: [f64; 3]) -> Vec<PlacedCommon> {
+fn commons(space: ObjectSpace, [x, y, z]: [f64; 3]) -> Vec<CartesianCommon> {
     let kinds = CommonKind::ALL.iter().chain(&[CommonKind::Sensor]);
     let common = |(k, &kind): (usize, &CommonKind)| {
         let place =
@@ -79,7 +79,7 @@ fn commons(space: ObjectSpace, [x, y, z]: [f64; 3]) -> Vec<PlacedCommon> {
         ObjectSpace::Geographic(_) => crate::geometry::local_vertical(x + 0.1, y - 0.05),
     };
     let commons = kinds.enumerate().map(common);
-    commons.map(|common| PlacedCommon::new(&common, space, [0.0; 3], &vertical)).collect()
+    commons.map(|common| CartesianCommon::new(&common, space, [0.0; 3], &vertical)).collect()
 }
 
 fn scenes() -> [Scene; 6] {
@@ -139,13 +139,14 @@ impl Scene {
         let states = self.states(unknowns);
         let common =
             |common: usize| (std::borrow::Cow::Borrowed(&states[common]), Some(self.in_block(common)));
-        let grounds = Grounds { space: self.space, mounts: &mounts, photo: &|_| first, common: &common };
-        let mounted = grounds.composed(3, AT_PHOTO).filter(|_| self.rig);
+        let pose_inputs =
+            PoseInputs { space: self.space, mounts: &mounts, photo: &|_| first, common: &common };
+        let mounted = pose_inputs.composed(3, AT_PHOTO).filter(|_| self.rig);
         ([first, mounted.as_ref().map_or(second, |own| own.orientation)], mounted)
     }
 
     fn states(&self, unknowns: &[f64]) -> Vec<CommonState> {
-        let state = |(k, common): (usize, &PlacedCommon)| common.at(&unknowns[self.of_block(BLOCKS + k)]);
+        let state = |(k, common): (usize, &CartesianCommon)| common.at(&unknowns[self.of_block(BLOCKS + k)]);
         self.commons.iter().enumerate().map(state).collect()
     }
 
@@ -228,18 +229,18 @@ fn stays(observation: &Observation) -> bool {
 
 /// Returns observations of nearly all types, of fixed quantities and of shared parameters.
 fn of_kinds() -> Vec<Observation> {
-    let alike = |sd: f64, count: usize| Precision::Deviations(vec![sd; count]);
+    let proportional = |sd: f64, count: usize| Precision::Deviations(vec![sd; count]);
     let two = Precision::Deviations(vec![0.01, 0.02]);
     let [attitude, boresight] = [[0.3, -0.2, 0.9], [0.02, 0.5, -0.1]].map(rotation);
     let of_attitude =
-        |boresight| Attitude { photo: 0, attitude, boresight, precision: alike(1e-4, 3) }.into();
-    let known = Position::new(1, PLACES[0], Vector3::new(0.3, -1.2, 0.8), alike(0.01, 3));
+        |boresight| Attitude { photo: 0, attitude, boresight, precision: proportional(1e-4, 3) }.into();
+    let known = Position::new(1, PLACES[0], Vector3::new(0.3, -1.2, 0.8), proportional(0.01, 3));
     let (shift, drift, time) = (Some(SHIFT), Some(DRIFT), -7.5);
     let in_common = Position { lever_arm: Quantity::Common(LEVER_ARM), shift, drift, time, ..known.clone() };
     let coefficients = vec![LEVER_ARM, SHIFT, DRIFT];
     let (factors, observed) = (vec![1.0, -2.0, 1.0], [0.1, 0.0, -0.2]);
     vec![
-        Control { point: 1, coordinates: PLACES[0], precision: alike(0.01, 3) }.into(),
+        Control { point: 1, coordinates: PLACES[0], precision: proportional(0.01, 3) }.into(),
         distance(None),
         distance(Some(INSTRUMENT)),
         Difference { points: [1, 0], components: [Some(1.0), None, Some(-2.0)], precision: two.clone() }
@@ -261,7 +262,7 @@ fn of_kinds() -> Vec<Observation> {
         prior(vec![SENSORS[0]], vec![6]),
         prior(vec![PLANE], vec![3]),
         prior(vec![PLANE, SENSORS[0]], vec![3, 6]),
-        Smoothness { coefficients, factors, observed, precision: alike(0.01, 3) }.into(),
+        Smoothness { coefficients, factors, observed, precision: proportional(0.01, 3) }.into(),
         fiducial(None, true),
         fiducial(Some(Pattern::Quadratic { half: 3.0 }), false),
         film(None, vec![3, 4, 5]),

@@ -4,9 +4,9 @@ use nalgebra::{DMatrix, DVector};
 use smallvec::SmallVec;
 
 use super::rows::{CommonSite, PhotoSite, PointSite};
-use super::{Observation, Rows, Sites, Touches};
+use super::{Observation, ObservationInputs, Rows, Touches};
 use crate::geometry::{ObjectSpace, Vector3};
-use crate::network::mounts::Moving;
+use crate::network::mounts::PhotoMotion;
 use crate::normals::GroupRows;
 
 /// An observation of points, photos and shared parameters of a model.
@@ -51,7 +51,7 @@ pub struct TiedModel<'a> {
     pub photo: &'a dyn Fn(usize) -> PhotoSite<'a>,
     pub common: &'a dyn Fn(usize) -> CommonSite<'a>,
     /// Motion of a photo; None without a trajectory.
-    pub moving: &'a dyn Fn(usize) -> Option<Moving>,
+    pub moving: &'a dyn Fn(usize) -> Option<PhotoMotion>,
     /// Number of parameters of each block.
     pub width: &'a dyn Fn(usize) -> usize,
 }
@@ -67,7 +67,7 @@ impl TiedObservation {
 
     /// Writes L^-1 (observed - computed) and L^-1 times the partials, in columns block by block.
     pub fn write(&self, model: &TiedModel<'_>, constant: &mut [f64], coefficients: &mut [f64]) {
-        let sites = self.sites(model);
+        let inputs = self.inputs(model);
         let mut width = 0;
         let column = |&block: &usize| {
             let first = width;
@@ -77,8 +77,8 @@ impl TiedObservation {
         let columns: Vec<(usize, usize)> = self.blocks.iter().map(column).collect();
         coefficients.fill(0.0);
         let mut rows =
-            Rows { sites: &sites, columns: &columns, width, constant: &mut *constant, coefficients };
-        self.observation.write(&sites, &mut rows);
+            Rows { inputs: &inputs, columns: &columns, width, constant: &mut *constant, coefficients };
+        self.observation.write(&inputs, &mut rows);
         self.whiten(constant, 1);
         self.whiten(coefficients, width);
     }
@@ -90,7 +90,7 @@ impl TiedObservation {
         model: &TiedModel<'_>,
         motions: impl Fn(&Vector3) -> [Vector3; N],
     ) -> Option<Vec<[f64; N]>> {
-        let axes = self.observation.axes(&self.sites(model))?;
+        let axes = self.observation.axes(&self.inputs(model))?;
         let rows = self.root.nrows();
         let width: usize = self.blocks.iter().map(|&block| (model.width)(block)).sum();
         let mut constant = vec![0.0; rows];
@@ -103,8 +103,8 @@ impl TiedObservation {
         Some(found)
     }
 
-    fn sites<'a>(&self, model: &TiedModel<'a>) -> Sites<'a> {
-        Sites {
+    fn inputs<'a>(&self, model: &TiedModel<'a>) -> ObservationInputs<'a> {
+        ObservationInputs {
             space: model.space,
             origin: model.origin,
             points: self.touches.points.iter().map(|&point| (model.point)(point)).collect(),

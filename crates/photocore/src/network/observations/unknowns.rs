@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{CommonKind, Named, ObservationModel, Precision, Rows, Sites, Touches, deviation, length};
+use super::{CommonKind, Named, ObservationModel, Precision, Rows, ObservationInputs, Touches, deviation, length};
 
 /// Joint observation of shared parameters with a full covariance matrix, from a separate adjustment.
 ///
@@ -46,14 +46,14 @@ impl ObservationModel for Prior {
         self.components[common]
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
         let observed = |k: usize| self.observed.get(k).copied().unwrap_or_default();
         let mut row = 0;
         for (common, &count) in self.components.iter().enumerate() {
             let missing =
-                sites.common(common).unknowns().enumerate().map(|(k, value)| observed(row + k) - value);
+                inputs.common(common).unknowns().enumerate().map(|(k, value)| observed(row + k) - value);
             rows.residual(row, &missing.collect::<Vec<f64>>());
-            rows.by_itself(row, common, count);
+            rows.add_identity(row, common, count);
             row += count;
         }
     }
@@ -84,12 +84,12 @@ impl ObservationModel for Base {
         Touches::default().and(Some(self.second), CommonKind::Sensor).and(self.first, CommonKind::Sensor)
     }
 
-    fn write(&self, sites: &Sites<'_>, rows: &mut Rows<'_>) {
-        let mut difference = sites.common(0).vector();
+    fn write(&self, inputs: &ObservationInputs<'_>, rows: &mut Rows<'_>) {
+        let mut difference = inputs.common(0).vector();
         if self.first.is_some() {
-            difference -= sites.common(1).vector();
+            difference -= inputs.common(1).vector();
         }
-        let direction = length(sites, rows, &difference, (self.length, None));
+        let direction = length(inputs, rows, &difference, (self.length, None));
         rows.by_offset(0, 0, &direction);
         if self.first.is_some() {
             rows.by_offset(0, 1, &-direction);

@@ -3,7 +3,7 @@
 use pulp::Simd;
 
 use super::{Batch, Part};
-use crate::normals::front::{Columns, Strip};
+use crate::normals::front::{Columns, PanelView};
 use crate::normals::layout::Layout;
 use crate::normals::vectorised::{Kernel, Rows, run_for_any_local, run_unsized, size};
 
@@ -11,11 +11,11 @@ impl Batch {
     /// Adds the equations and Schur complement of the batch to columns of its front.
     pub fn add_to(&self, columns: &mut Columns<'_>, layout: &Layout) {
         let (rows, l) = (layout.rows(), layout.local_dim());
-        run_for_any_local(layout, self.retained_dim(), AddSlots { batch: self, columns, rows, l });
-        if self.is_together() {
-            self.add_together(columns);
-        } else if !self.segments.is_empty() {
-            run_unsized(AddSegments { batch: self, columns, rows, l });
+        run_for_any_local(layout, self.retained_dim(), AddMainBlocks { batch: self, columns, rows, l });
+        if self.has_joint_products() {
+            self.add_joint_products(columns);
+        } else if !self.spans.is_empty() {
+            run_unsized(AddSpans { batch: self, columns, rows, l });
         }
     }
 
@@ -27,37 +27,43 @@ impl Batch {
 
     /// Adds products of main blocks only.
     #[inline(always)]
-    fn add_slots<S: Simd, const D: usize>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, l: usize) {
-        for (index, slot) in self.slots.iter().enumerate() {
-            if !columns.contain(slot.row) {
+    fn add_main_blocks<S: Simd, const D: usize>(
+        &self,
+        simd: S,
+        columns: &mut Columns<'_>,
+        rows: usize,
+        l: usize,
+    ) {
+        for (index, main) in self.main_blocks.iter().enumerate() {
+            if !columns.contain(main.row) {
                 continue;
             }
-            let v = self.slot_coupling::<D>(slot, l);
-            let own = self.slot_rows::<D>(slot, rows);
-            let constants = &self.constants[slot.constants..][..slot.groups.len() * self.locals.len() * rows];
+            let v = self.main_coupling::<D>(main, l);
+            let own = self.main_rows::<D>(main, rows);
+            let constants = &self.constants[main.constants..][..main.groups.len() * self.locals.len() * rows];
             columns.add_difference(simd, own, v, self.locals.len());
             columns.add_equations(simd, own, constants);
-            if !self.apart {
+            if !self.uncoupled {
                 columns.subtract_right(simd, v, &self.reduced);
             }
-            for other in self.coupled_to(&self.slots[index + 1..]) {
-                columns.add_product(simd, -1.0, self.slot_coupling::<D>(other, l), v);
+            for other in self.coupled_to(&self.main_blocks[index + 1..]) {
+                columns.add_product(simd, -1.0, self.main_coupling::<D>(other, l), v);
             }
         }
     }
 
     /// Adds products of segments with main blocks above them in the front.
     #[inline(always)]
-    fn add_below_slots<S: Simd>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, l: usize) {
-        for slot in &self.slots {
-            if !columns.contain(slot.row) {
+    fn add_below_main_blocks<S: Simd>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, l: usize) {
+        for main in &self.main_blocks {
+            if !columns.contain(main.row) {
                 continue;
             }
-            let (v, own) = (self.slot_coupling::<0>(slot, l), self.slot_rows::<0>(slot, rows));
-            for segment in self.segments.iter().filter(|segment| segment.row > slot.row) {
-                let coupling = self.segment_coupling(segment, l);
-                let shared = match segment.run_of(slot.groups.start) {
-                    Some(run) => self.run_rows(segment, run, slot.groups.clone(), rows),
+            let (v, own) = (self.main_coupling::<0>(main, l), self.main_rows::<0>(main, rows));
+            for span in self.spans.iter().filter(|span| span.row > main.row) {
+                let coupling = self.span_coupling(span, l);
+                let shared = match span.run_of(main.groups.start) {
+                    Some(run) => self.run_rows(span, run, main.groups.clone(), rows),
                     None if self.coupled => coupling.emptied(),
                     None => continue,
                 };
@@ -69,31 +75,29 @@ impl Batch {
     /// Adds products of shared blocks with themselves and with main blocks that are not part of a run.
     #[inline(always)]
     fn add_parts<S: Simd>(&self, simd: S, columns: &mut Columns<'_>, rows: usize) {
-        for slot in &self.slots {
-            let width = slot.dim;
+        for main in &self.main_blocks {
+            let width = main.dim;
             // With one group per local block on the main block, the equations of all local blocks are contiguous.
-            let together = if slot.groups.len() == 1 { self.locals.len() } else { 1 };
+            let together = if main.groups.len() == 1 { self.locals.len() } else { 1 };
             let count = together * rows;
-            for (k, p) in slot.groups.clone().enumerate() {
-                let in_run = |part: &Part| self.segments[part.segment].run_of(p).is_some();
+            for (k, p) in main.groups.clone().enumerate() {
+                let in_run = |part: &Part| self.spans[part.span].run_of(p).is_some();
                 if self.parts(p).len() == 1
-                    && self
-                        .parts(p)
-                        .iter()
-                        .all(|part| in_run(part) && self.segments[part.segment].row > slot.row)
+                    && self.parts(p).iter().all(|part| in_run(part) && self.spans[part.span].row > main.row)
                 {
                     continue;
                 }
                 for t in (0..self.locals.len()).step_by(together) {
-                    let at = (t * slot.groups.len() + k) * rows;
-                    let values = &self.retained_rows[slot.retained + at * width..];
-                    let retained = Strip { at: slot.row, rows: Rows { values, width, stride: width, count } };
-                    let constants = &self.constants[slot.constants + at..][..count];
+                    let at = (t * main.groups.len() + k) * rows;
+                    let values = &self.retained_rows[main.retained + at * width..];
+                    let retained =
+                        PanelView { at: main.row, rows: Rows { values, width, stride: width, count } };
+                    let constants = &self.constants[main.constants + at..][..count];
                     for (index, part) in self.parts(p).iter().enumerate() {
                         let equations = t * rows..t * rows + count;
                         let own = self.part_rows(p, part, equations.clone());
                         let in_run = in_run(part);
-                        let below = !in_run || self.segments[part.segment].row < slot.row;
+                        let below = !in_run || self.spans[part.span].row < main.row;
                         let others = self.parts(p)[..index].iter();
                         let others = others.map(|other| self.part_rows(p, other, equations.clone()));
                         let retained = below.then_some(retained);
@@ -111,16 +115,16 @@ impl Batch {
 
     /// Adds products of runs in the columns of segments, and subtracts the Schur complement there.
     #[inline(always)]
-    fn add_segments<S: Simd>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, l: usize) {
-        for (index, segment) in self.segments.iter().enumerate() {
-            if !columns.contain(segment.row) {
+    fn add_spans<S: Simd>(&self, simd: S, columns: &mut Columns<'_>, rows: usize, l: usize) {
+        for (index, span) in self.spans.iter().enumerate() {
+            if !columns.contain(span.row) {
                 continue;
             }
-            let v = self.segment_coupling(segment, l);
-            for number in 0..segment.runs.len().max(1) {
-                let own = match segment.runs.get(number) {
+            let v = self.span_coupling(span, l);
+            for number in 0..span.runs.len().max(1) {
+                let own = match span.runs.get(number) {
                     Some(run) => {
-                        let own = self.run_rows(segment, run, run.places.clone(), rows);
+                        let own = self.run_rows(span, run, run.places.clone(), rows);
                         let first = run.places.start * self.locals.len() * rows;
                         columns.add_equations(simd, own, &self.constants[first..]);
                         own
@@ -130,13 +134,13 @@ impl Batch {
                 let taken = if number == 0 { v } else { v.emptied() };
                 columns.add_products(simd, [(1.0, own, own), (-1.0, taken, taken)]);
             }
-            if !self.apart {
+            if !self.uncoupled {
                 columns.subtract_right(simd, v, &self.reduced);
             }
-            let segments = self.coupled_to(&self.segments[index + 1..]).iter();
-            let slots = self.coupled_to(&self.slots).iter().filter(|slot| slot.row > segment.row);
-            let slots = slots.map(|slot| self.slot_coupling::<0>(slot, l));
-            for other in segments.map(|other| self.segment_coupling(other, l)).chain(slots) {
+            let spans = self.coupled_to(&self.spans[index + 1..]).iter();
+            let main_blocks = self.coupled_to(&self.main_blocks).iter().filter(|main| main.row > span.row);
+            let main_blocks = main_blocks.map(|main| self.main_coupling::<0>(main, l));
+            for other in spans.map(|other| self.span_coupling(other, l)).chain(main_blocks) {
                 columns.add_product(simd, -1.0, other, v);
             }
         }
@@ -145,41 +149,41 @@ impl Batch {
 
 /// Adds A^T B or its transpose, so that the lower strip in the front gives the rows.
 #[inline(always)]
-fn add_below<S: Simd>(simd: S, columns: &mut Columns<'_>, a: Strip<'_>, b: Strip<'_>) {
+fn add_below<S: Simd>(simd: S, columns: &mut Columns<'_>, a: PanelView<'_>, b: PanelView<'_>) {
     let (lower, upper) = if a.at > b.at { (a, b) } else { (b, a) };
     if columns.contain(upper.at) {
         columns.add_product(simd, 1.0, lower, upper);
     }
 }
 
-struct AddSlots<'a, 'b> {
+struct AddMainBlocks<'a, 'b> {
     batch: &'a Batch,
     columns: &'a mut Columns<'b>,
     rows: usize,
     l: usize,
 }
 
-impl Kernel for AddSlots<'_, '_> {
+impl Kernel for AddMainBlocks<'_, '_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
-        self.batch.add_slots::<S, D>(simd, self.columns, size::<R>(self.rows), size::<L>(self.l));
+        self.batch.add_main_blocks::<S, D>(simd, self.columns, size::<R>(self.rows), size::<L>(self.l));
     }
 }
 
 /// Kernel of shared blocks, which have any size. The product is compiled for all widths at each call, so it has few calls.
-struct AddSegments<'a, 'b> {
+struct AddSpans<'a, 'b> {
     batch: &'a Batch,
     columns: &'a mut Columns<'b>,
     rows: usize,
     l: usize,
 }
 
-impl Kernel for AddSegments<'_, '_> {
+impl Kernel for AddSpans<'_, '_> {
     #[inline(always)]
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
         let Self { batch, columns, rows, l } = self;
-        batch.add_below_slots(simd, columns, rows, l);
+        batch.add_below_main_blocks(simd, columns, rows, l);
         batch.add_parts(simd, columns, rows);
-        batch.add_segments(simd, columns, rows, l);
+        batch.add_spans(simd, columns, rows, l);
     }
 }

@@ -23,16 +23,16 @@ impl Batch {
     /// Adds A^T l for shared blocks; the unknowns of each segment start at `starts`.
     #[inline(always)]
     fn add_rights_of_common<S: Simd>(&self, simd: S, rows: usize, starts: &[usize], rights: &mut [f64]) {
-        for slot in &self.slots {
+        for main in &self.main_blocks {
             // With one group per local block on the main block, the equations of all local blocks are contiguous.
-            let together = if slot.groups.len() == 1 { self.locals.len() } else { 1 };
+            let together = if main.groups.len() == 1 { self.locals.len() } else { 1 };
             let count = together * rows;
-            for (k, p) in slot.groups.clone().enumerate() {
+            for (k, p) in main.groups.clone().enumerate() {
                 for t in (0..self.locals.len()).step_by(together) {
-                    let constants = &self.constants[slot.constants + (t * slot.groups.len() + k) * rows..];
+                    let constants = &self.constants[main.constants + (t * main.groups.len() + k) * rows..];
                     for part in self.parts(p) {
                         let own = self.part_rows(p, part, t * rows..t * rows + count).rows;
-                        let target = &mut rights[starts[part.segment] + part.shift..];
+                        let target = &mut rights[starts[part.span] + part.shift..];
                         add_right(simd, target, None, 1.0, own, &constants[..count]);
                     }
                 }
@@ -52,7 +52,7 @@ impl Kernel for FromRights<'_> {
     fn run<S: Simd, const R: usize, const L: usize, const D: usize>(self, simd: S) {
         let Self { batch, layout, prior } = self;
         let rows = size::<R>(layout.rows());
-        if batch.apart {
+        if batch.uncoupled {
             return;
         }
         batch.factor::<S, L>(simd, rows, (layout, prior), 0.0);
@@ -60,10 +60,10 @@ impl Kernel for FromRights<'_> {
         for (t, triangle) in batch.triangles.iter().enumerate() {
             let mut x: [f64; L] = std::array::from_fn(|d| batch.reduced[t * L + d]);
             triangle.backward::<L>(&mut x, 1);
-            for slot in &batch.slots {
-                for (k, p) in slot.groups.clone().enumerate() {
+            for main in &batch.main_blocks {
+                for (k, p) in main.groups.clone().enumerate() {
                     let constants =
-                        &mut batch.constants[slot.constants + (t * slot.groups.len() + k) * rows..];
+                        &mut batch.constants[main.constants + (t * main.groups.len() + k) * rows..];
                     let own = batch.local_rows[(p * depth + t) * rows * L..][..rows * L].as_chunks::<L>().0;
                     constants.iter_mut().zip(own).for_each(|(constant, row)| *constant -= dot(row, &x));
                 }
@@ -84,15 +84,15 @@ impl Kernel for OfOthers<'_> {
         let Self { batch, rights, .. } = self;
         let rows = size::<R>(self.rows);
         let mut end = 0;
-        for slot in &batch.slots {
-            let own = batch.slot_rows::<D>(slot, rows).rows;
-            add_right(simd, &mut rights[end..], None, 1.0, own, &batch.constants[slot.constants..]);
+        for main in &batch.main_blocks {
+            let own = batch.main_rows::<D>(main, rows).rows;
+            add_right(simd, &mut rights[end..], None, 1.0, own, &batch.constants[main.constants..]);
             end += own.width;
         }
         let mut starts = SmallVec::<[usize; 4]>::new();
-        for segment in &batch.segments {
+        for span in &batch.spans {
             starts.push(end);
-            end += segment.unknowns.len();
+            end += span.unknowns.len();
         }
         batch.add_rights_of_common(simd, rows, &starts, rights);
     }

@@ -14,8 +14,8 @@ use crate::normals::vectorised::{Kernel, LANES, copy_vectors, run, size};
 impl Batch {
     /// Eliminates the unknowns of the local blocks. `damping` is the fraction of the diagonal that is added to it.
     pub fn eliminate(&mut self, layout: &Layout, prior: &Prior, damping: f64) {
-        if self.apart {
-            return self.leave_apart(layout);
+        if self.uncoupled {
+            return self.skip_elimination(layout);
         }
         run(layout, self.retained_dim(), Eliminate { batch: self, layout, prior, damping });
     }
@@ -89,10 +89,10 @@ impl Batch {
         normal: &mut [[f64; L]; L],
         right: &mut [f64; L],
     ) {
-        for slot in &self.slots {
-            for (k, p) in slot.groups.clone().enumerate() {
+        for main in &self.main_blocks {
+            for (k, p) in main.groups.clone().enumerate() {
                 let constants =
-                    &self.constants[slot.constants + (t * slot.groups.len() + k) * rows..][..rows];
+                    &self.constants[main.constants + (t * main.groups.len() + k) * rows..][..rows];
                 let own = &self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L];
                 for (row, constant) in own.as_chunks::<L>().0.iter().zip(constants) {
                     for a in 0..L {
@@ -112,27 +112,27 @@ impl Batch {
     fn couple<S: Simd, const L: usize, const D: usize>(&mut self, simd: S, rows: usize) {
         let own = self.places.len() * self.locals.len() * rows * L;
         self.coupled = self.local_rows[..own].iter().any(|&value| value != 0.0);
-        self.couple_slots::<S, L, D>(simd, rows);
+        self.couple_main_blocks::<S, L, D>(simd, rows);
         self.couple_runs::<S, L>(simd, rows);
-        if !self.segments.iter().all(|segment| segment.plain) {
-            (0..self.locals.len()).for_each(|t| self.couple_segments::<L>(t, rows));
+        if !self.spans.iter().all(|span| span.plain) {
+            (0..self.locals.len()).for_each(|t| self.couple_spans::<L>(t, rows));
         }
     }
 
     /// Computes the coupling to main blocks.
     #[inline(always)]
-    fn couple_slots<S: Simd, const L: usize, const D: usize>(&mut self, simd: S, rows: usize) {
+    fn couple_main_blocks<S: Simd, const L: usize, const D: usize>(&mut self, simd: S, rows: usize) {
         let depth = self.locals.len();
-        for slot in &self.slots {
-            let dim = size::<D>(slot.dim);
+        for main in &self.main_blocks {
+            let dim = size::<D>(main.dim);
             // An explicit loop: zipped iterators would cause a call per main block.
             for (t, triangle) in self.triangles.iter().enumerate() {
-                let coupling = &mut self.coupling[slot.coupling + t * L * dim..][..L * dim];
+                let coupling = &mut self.coupling[main.coupling + t * L * dim..][..L * dim];
                 for first in (0..dim).step_by(LANES) {
                     let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
-                    for (k, p) in slot.groups.clone().enumerate() {
+                    for (k, p) in main.groups.clone().enumerate() {
                         let own = &self.local_rows[(p * depth + t) * rows * L..][..rows * L];
-                        let at = slot.retained + (t * slot.groups.len() + k) * rows * dim;
+                        let at = main.retained + (t * main.groups.len() + k) * rows * dim;
                         add_rows::<S, L>(simd, &mut sums, own, &self.retained_rows[at + first..], dim);
                     }
                     triangle.forward_vectors::<S, L>(simd, &mut sums);
@@ -146,9 +146,9 @@ impl Batch {
     #[inline(always)]
     fn couple_runs<S: Simd, const L: usize>(&mut self, simd: S, rows: usize) {
         let depth = self.locals.len();
-        for segment in self.segments.iter().filter(|segment| segment.plain) {
-            let width = segment.unknowns.len();
-            let groups = segment.runs.iter().flat_map(|run| {
+        for span in self.spans.iter().filter(|span| span.plain) {
+            let width = span.unknowns.len();
+            let groups = span.runs.iter().flat_map(|run| {
                 let group = |p: usize| {
                     let Place { width, rows: start, .. } = self.places[p];
                     Group { local: p * depth * rows * L, shared: start + run.column, stride: width }
@@ -157,7 +157,7 @@ impl Batch {
             });
             let groups: SmallVec<[Group; 8]> = groups.collect();
             for (t, triangle) in self.triangles.iter().enumerate() {
-                let coupling = &mut self.coupling[segment.coupling + t * L * width..][..L * width];
+                let coupling = &mut self.coupling[span.coupling + t * L * width..][..L * width];
                 for first in (0..width).step_by(LANES) {
                     let mut sums = [[simd.splat_f64s(0.0); LANES]; L];
                     for &Group { local, shared, stride } in &groups {
@@ -174,29 +174,29 @@ impl Batch {
 
     /// Computes the coupling of local block `t` of the batch to the other segments.
     #[inline(always)]
-    fn couple_segments<const L: usize>(&mut self, t: usize, rows: usize) {
+    fn couple_spans<const L: usize>(&mut self, t: usize, rows: usize) {
         let triangle = self.triangles[t];
-        for segment in self.segments.iter().filter(|segment| !segment.plain) {
-            let width = segment.unknowns.len();
-            self.coupling[segment.coupling + t * L * width..][..L * width].fill(0.0);
+        for span in self.spans.iter().filter(|span| !span.plain) {
+            let width = span.unknowns.len();
+            self.coupling[span.coupling + t * L * width..][..L * width].fill(0.0);
         }
         for (p, &Place { ref parts, width, rows: start }) in self.places.iter().enumerate() {
             let own = &self.local_rows[(p * self.locals.len() + t) * rows * L..][..rows * L];
             let shared = &self.shared_rows[start + t * rows * width..][..rows * width];
             for part in &self.parts[parts.clone()] {
-                let segment = &self.segments[part.segment];
-                if segment.plain {
+                let span = &self.spans[part.span];
+                if span.plain {
                     continue;
                 }
-                let stride = segment.unknowns.len();
-                let coupling = &mut self.coupling[segment.coupling + t * L * stride..][..L * stride];
+                let stride = span.unknowns.len();
+                let coupling = &mut self.coupling[span.coupling + t * L * stride..][..L * stride];
                 let columns = part.column..part.column + part.width();
                 add_product::<L>(&mut coupling[part.shift..], stride, own, shared, width, columns);
             }
         }
-        for segment in self.segments.iter().filter(|segment| !segment.plain) {
-            let width = segment.unknowns.len();
-            triangle.forward::<L>(&mut self.coupling[segment.coupling + t * L * width..][..L * width], width);
+        for span in self.spans.iter().filter(|span| !span.plain) {
+            let width = span.unknowns.len();
+            triangle.forward::<L>(&mut self.coupling[span.coupling + t * L * width..][..L * width], width);
         }
     }
 }

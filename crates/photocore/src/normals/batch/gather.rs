@@ -12,7 +12,7 @@ impl Batch {
     pub fn gather(&mut self, equations: &dyn Equations, system: &System, units: &[u32]) {
         self.place(system, units);
         self.own.clear();
-        if system.layout.has_local_ties() && !self.apart {
+        if system.layout.has_local_ties() && !self.uncoupled {
             let mut buffer = RowBuffer::default();
             let of = |&local: &u32| TieSums::of(equations, &system.layout, local as usize, &mut buffer);
             self.own.extend(self.locals.iter().map(of));
@@ -20,25 +20,25 @@ impl Batch {
         let (rows, l) = (system.layout.rows(), system.layout.local_dim());
         let (depth, incidence) = (self.locals.len(), &system.incidence);
         let mut groups: SmallVec<[u32; 32]> = smallvec![0; depth];
-        for slot in &self.slots {
+        for main in &self.main_blocks {
             // With one group per local block on the main block, the groups of all local blocks are contiguous.
-            let together = if slot.groups.len() == 1 { depth } else { 1 };
+            let together = if main.groups.len() == 1 { depth } else { 1 };
             let count = together * rows;
-            for (k, p) in slot.groups.clone().enumerate() {
+            for (k, p) in main.groups.clone().enumerate() {
                 let Place { width, rows: shared, .. } = self.places[p];
                 for t in (0..depth).step_by(together) {
-                    let at = (t * slot.groups.len() + k) * rows;
+                    let at = (t * main.groups.len() + k) * rows;
                     let mut part = GroupRows {
-                        constant: &mut self.constants[slot.constants + at..][..count],
+                        constant: &mut self.constants[main.constants + at..][..count],
                         local: &mut self.local_rows[(p * depth + t) * rows * l..][..count * l],
-                        retained: &mut self.retained_rows[slot.retained + at * slot.dim..]
-                            [..count * slot.dim],
+                        retained: &mut self.retained_rows[main.retained + at * main.dim..]
+                            [..count * main.dim],
                         shared: &mut self.shared_rows[shared + t * rows * width..][..count * width],
                     };
                     for (group, &unit) in groups.iter_mut().zip(&units[t..t + together]) {
                         *group = incidence.groups_of(&system.layout, unit as usize)[p];
                     }
-                    equations.write_alike(&self.locals[t..t + together], &groups[..together], &mut part);
+                    equations.write_batch(&self.locals[t..t + together], &groups[..together], &mut part);
                 }
             }
         }

@@ -1,17 +1,17 @@
 //! Batches: local blocks with equal patterns, gathered and eliminated in parallel lanes.
 
 mod add;
-mod apart;
 mod chord;
 mod eliminate;
 mod gather;
 mod place;
+mod uncoupled;
 
 use std::ops::Range;
 
 use smallvec::SmallVec;
 
-use super::front::Strip;
+use super::front::PanelView;
 use super::symbolic::Symbolic;
 use super::triangle::Triangle;
 use super::vectorised::{Rows, size};
@@ -20,7 +20,7 @@ pub(super) use place::{parts_of, unite};
 
 /// Main retained block that is coupled to the local blocks.
 #[derive(Debug, Clone)]
-pub(super) struct Slot {
+pub(super) struct MainBlock {
     /// Position in elimination order.
     pub position: usize,
     /// First row in the front.
@@ -37,7 +37,7 @@ pub(super) struct Slot {
 /// Consecutive unknowns of a shared block that are coupled to the local blocks. Segments are in the order of their positions, which is the
 /// order of their rows in the front.
 #[derive(Debug, Clone)]
-pub(super) struct Segment {
+pub(super) struct SharedSpan {
     /// Position of the block in elimination order.
     pub position: usize,
     /// Range of unknowns in the block.
@@ -59,7 +59,7 @@ struct Run {
     column: usize,
 }
 
-impl Segment {
+impl SharedSpan {
     /// Returns the run of a group of the pattern.
     #[inline(always)]
     fn run_of(&self, p: usize) -> Option<&Run> {
@@ -103,7 +103,7 @@ pub(super) struct Part {
     position: usize,
     unknowns: Range<usize>,
     /// Segment that contains the part, and offset in it.
-    pub segment: usize,
+    pub span: usize,
     pub shift: usize,
     /// First column in the shared coefficients of the group.
     column: usize,
@@ -118,19 +118,19 @@ impl Part {
 
 /// Sums over the equations of independent groups with many narrow shared parts.
 #[derive(Debug, Default)]
-struct Together {
+struct JointProducts {
     /// Products of the shared columns with themselves, from the diagonal, and with the columns of the main block. Stored by columns, one
     /// row per shared column; empty if parts are multiplied separately.
     products: Vec<f64>,
     /// Products of the shared columns with the right-hand sides.
     right: Vec<f64>,
     /// Columns that are contiguous in the front.
-    runs: Vec<Stretch>,
+    runs: Vec<ColumnRun>,
 }
 
 /// Consecutive columns that are also consecutive in the front.
 #[derive(Debug)]
-struct Stretch {
+struct ColumnRun {
     at: usize,
     column: usize,
     width: usize,
@@ -153,9 +153,9 @@ pub(super) struct Batch {
     /// Local block of each unit.
     pub locals: Vec<u32>,
     /// Whether the units are independent groups.
-    pub apart: bool,
-    pub slots: Vec<Slot>,
-    pub segments: Vec<Segment>,
+    pub uncoupled: bool,
+    pub main_blocks: Vec<MainBlock>,
+    pub spans: Vec<SharedSpan>,
     pub triangles: Vec<Triangle>,
     /// Sum of squares of the right-hand sides of the equations.
     pub sum_of_squares: f64,
@@ -165,7 +165,7 @@ pub(super) struct Batch {
     pub deficient: Vec<usize>,
     /// Whether V is nonzero; fixed local blocks have zero coupling.
     coupled: bool,
-    together: Together,
+    together: JointProducts,
     places: Vec<Place>,
     /// Assembly node of the local blocks.
     node: usize,
@@ -173,8 +173,8 @@ pub(super) struct Batch {
     set: Option<u32>,
     commons: Vec<Common>,
     parts: Vec<Part>,
-    /// Scratch memory for the unknowns of the segments.
-    spans: Vec<(usize, Range<usize>)>,
+    /// Scratch memory for the unknowns of the spans.
+    ranges: Vec<(usize, Range<usize>)>,
     /// Normal equations of the ties of each local block; empty if no tie is local.
     own: Vec<TieSums>,
     constants: Vec<f64>,
@@ -191,44 +191,44 @@ pub(super) struct Batch {
 impl Batch {
     /// Returns the number of unknowns per main block, if it is equal for all: it selects the kernel.
     pub fn retained_dim(&self) -> Option<usize> {
-        let dim = self.slots.first()?.dim;
-        self.slots.iter().all(|slot| slot.dim == dim).then_some(dim)
+        let dim = self.main_blocks.first()?.dim;
+        self.main_blocks.iter().all(|main| main.dim == dim).then_some(dim)
     }
 
     /// Number of local blocks with a coupling: zero for independent groups.
     #[inline(always)]
     fn coupled_locals(&self) -> usize {
-        if self.apart { 0 } else { self.locals.len() }
+        if self.uncoupled { 0 } else { self.locals.len() }
     }
 
     /// Returns the coupling of local blocks with l unknowns to a main block, local block by local block.
     #[inline(always)]
-    pub fn slot_coupling<const D: usize>(&self, slot: &Slot, l: usize) -> Strip<'_> {
-        let (width, count) = (size::<D>(slot.dim), self.coupled_locals() * l);
-        let values = &self.coupling[slot.coupling..];
-        Strip { at: slot.row, rows: Rows { values, width, stride: width, count } }
+    pub fn main_coupling<const D: usize>(&self, main: &MainBlock, l: usize) -> PanelView<'_> {
+        let (width, count) = (size::<D>(main.dim), self.coupled_locals() * l);
+        let values = &self.coupling[main.coupling..];
+        PanelView { at: main.row, rows: Rows { values, width, stride: width, count } }
     }
 
     /// Returns the coupling of local blocks with l unknowns to a segment, local block by local block.
     #[inline(always)]
-    pub fn segment_coupling(&self, segment: &Segment, l: usize) -> Strip<'_> {
-        let (width, count) = (segment.unknowns.len(), self.coupled_locals() * l);
-        let values = &self.coupling[segment.coupling..];
-        Strip { at: segment.row, rows: Rows { values, width, stride: width, count } }
+    pub fn span_coupling(&self, span: &SharedSpan, l: usize) -> PanelView<'_> {
+        let (width, count) = (span.unknowns.len(), self.coupled_locals() * l);
+        let values = &self.coupling[span.coupling..];
+        PanelView { at: span.row, rows: Rows { values, width, stride: width, count } }
     }
 
     /// Returns the ranges of coupled unknowns in elimination order: main blocks before segments.
     pub fn ranges<'s>(&'s self, symbolic: &'s Symbolic) -> impl Iterator<Item = Range<usize>> + 's {
-        let of_segments = self.segments.iter().map(|segment| segment.range(symbolic));
-        self.slots.iter().map(|slot| symbolic.range(slot.position)).chain(of_segments)
+        let of_segments = self.spans.iter().map(|span| span.range(symbolic));
+        self.main_blocks.iter().map(|main| symbolic.range(main.position)).chain(of_segments)
     }
 
     /// Returns the coefficients of a main block in all equations, local block by local block.
     #[inline(always)]
-    pub fn slot_rows<const D: usize>(&self, slot: &Slot, rows: usize) -> Strip<'_> {
-        let (width, count) = (size::<D>(slot.dim), slot.groups.len() * self.locals.len() * rows);
-        let values = &self.retained_rows[slot.retained..];
-        Strip { at: slot.row, rows: Rows { values, width, stride: width, count } }
+    pub fn main_rows<const D: usize>(&self, main: &MainBlock, rows: usize) -> PanelView<'_> {
+        let (width, count) = (size::<D>(main.dim), main.groups.len() * self.locals.len() * rows);
+        let values = &self.retained_rows[main.retained..];
+        PanelView { at: main.row, rows: Rows { values, width, stride: width, count } }
     }
 
     /// Returns the coefficients of local block `t` of the batch in group `p` of the pattern.
@@ -239,11 +239,11 @@ impl Batch {
 
     /// Returns the coefficients of a segment in all equations of some groups of a run, by group and local block.
     #[inline(always)]
-    fn run_rows(&self, segment: &Segment, run: &Run, places: Range<usize>, rows: usize) -> Strip<'_> {
+    fn run_rows(&self, span: &SharedSpan, run: &Run, places: Range<usize>, rows: usize) -> PanelView<'_> {
         let Place { width: stride, rows: start, .. } = self.places[places.start];
         let values = &self.shared_rows[start + run.column..];
         let count = places.len() * self.locals.len() * rows;
-        Strip { at: segment.row, rows: Rows { values, width: segment.unknowns.len(), stride, count } }
+        PanelView { at: span.row, rows: Rows { values, width: span.unknowns.len(), stride, count } }
     }
 
     /// Returns the shared parts of group `p` of the pattern.
@@ -254,10 +254,10 @@ impl Batch {
 
     /// Returns the coefficients of a part of group `p` of the pattern in a range of its equations, which are numbered by local block.
     #[inline(always)]
-    pub fn part_rows(&self, p: usize, part: &Part, equations: Range<usize>) -> Strip<'_> {
+    pub fn part_rows(&self, p: usize, part: &Part, equations: Range<usize>) -> PanelView<'_> {
         let Place { width: stride, rows: start, .. } = self.places[p];
         let values = &self.shared_rows[start + equations.start * stride + part.column..];
-        let at = self.segments[part.segment].row + part.shift;
-        Strip { at, rows: Rows { values, width: part.width(), stride, count: equations.len() } }
+        let at = self.spans[part.span].row + part.shift;
+        PanelView { at, rows: Rows { values, width: part.width(), stride, count: equations.len() } }
     }
 }

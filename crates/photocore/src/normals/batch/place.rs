@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use smallvec::{SmallVec, smallvec};
 
-use super::{Batch, Common, Part, Place, Run, Segment, Slot};
+use super::{Batch, Common, MainBlock, Part, Place, Run, SharedSpan};
 use crate::normals::layout::Layout;
 use crate::normals::symbolic::Symbolic;
 use crate::normals::system::System;
@@ -21,25 +21,25 @@ impl Batch {
         let (rows, l, depth) = (layout.rows(), layout.local_dim(), units.len());
         self.locals.clear();
         self.locals.extend(units.iter().map(|&unit| layout.local_of(unit as usize) as u32));
-        self.slots.clear();
+        self.main_blocks.clear();
         self.places.clear();
         let Some(&first) = units.first() else { return };
-        self.apart = layout.is_apart(first as usize);
+        self.uncoupled = layout.is_uncoupled(first as usize);
         let groups = system.incidence.groups_of(layout, first as usize);
         let positions = system.incidence.positions_of(layout, first as usize);
-        self.place_slots(symbolic, positions);
+        self.place_main_blocks(symbolic, positions);
         let shared = self.place_commons(system, first as usize);
         let (mut retained, mut coupling, coupled) = (0, self.start, self.coupled_locals());
-        for slot in &mut self.slots {
-            slot.row = symbolic.row_of(self.node, slot.position);
-            slot.constants = slot.groups.start * rows * depth;
-            (slot.retained, slot.coupling) = (retained, coupling);
-            retained += slot.groups.len() * rows * depth * slot.dim;
-            coupling += l * coupled * slot.dim;
+        for main in &mut self.main_blocks {
+            main.row = symbolic.row_of(self.node, main.position);
+            main.constants = main.groups.start * rows * depth;
+            (main.retained, main.coupling) = (retained, coupling);
+            retained += main.groups.len() * rows * depth * main.dim;
+            coupling += l * coupled * main.dim;
         }
-        for segment in &mut self.segments {
-            segment.coupling = coupling;
-            coupling += l * coupled * segment.unknowns.len();
+        for span in &mut self.spans {
+            span.coupling = coupling;
+            coupling += l * coupled * span.unknowns.len();
         }
         self.find_runs();
         self.end = coupling;
@@ -55,11 +55,11 @@ impl Batch {
     }
 
     /// Finds the main blocks.
-    fn place_slots(&mut self, symbolic: &Symbolic, positions: &[u32]) {
+    fn place_main_blocks(&mut self, symbolic: &Symbolic, positions: &[u32]) {
         for (p, &position) in positions.iter().enumerate() {
-            match self.slots.last_mut() {
-                Some(slot) if slot.position == position as usize => slot.groups.end += 1,
-                _ => self.slots.push(Slot {
+            match self.main_blocks.last_mut() {
+                Some(main) if main.position == position as usize => main.groups.end += 1,
+                _ => self.main_blocks.push(MainBlock {
                     position: position as usize,
                     row: 0,
                     dim: symbolic.dim(position as usize),
@@ -108,14 +108,13 @@ impl Batch {
         self.parts.clear();
         for shared in &mut self.commons {
             let start = self.parts.len();
-            let part =
-                |(position, unknowns, column)| Part { position, unknowns, segment: 0, shift: 0, column };
+            let part = |(position, unknowns, column)| Part { position, unknowns, span: 0, shift: 0, column };
             self.parts.extend(parts_of(layout, symbolic, shared.group).map(part));
             shared.parts = start..self.parts.len();
         }
-        unite(self.parts.iter().map(|part| (part.position, part.unknowns.clone())), &mut self.spans);
+        unite(self.parts.iter().map(|part| (part.position, part.unknowns.clone())), &mut self.ranges);
         let node = self.node;
-        let segment = |(position, unknowns): (usize, Range<usize>)| Segment {
+        let span = |(position, unknowns): (usize, Range<usize>)| SharedSpan {
             position,
             row: symbolic.row_of(node, position) + unknowns.start,
             unknowns,
@@ -123,25 +122,25 @@ impl Batch {
             runs: SmallVec::new(),
             plain: false,
         };
-        self.segments.clear();
-        self.segments.extend(self.spans.drain(..).map(segment));
+        self.spans.clear();
+        self.spans.extend(self.ranges.drain(..).map(span));
         for part in &mut self.parts {
             let key = (part.position, part.unknowns.start);
-            let after =
-                self.segments.partition_point(|segment| (segment.position, segment.unknowns.start) <= key);
-            part.segment = after.saturating_sub(1);
-            part.shift = part.unknowns.start - self.segments[part.segment].unknowns.start;
+            let after = self.spans.partition_point(|span| (span.position, span.unknowns.start) <= key);
+            part.span = after.saturating_sub(1);
+            part.shift = part.unknowns.start - self.spans[part.span].unknowns.start;
         }
     }
 
     /// Finds the runs: groups whose coefficients in a segment form one matrix.
     fn find_runs(&mut self) {
-        self.segments.iter_mut().for_each(|segment| segment.runs.clear());
-        let single = self.slots.iter().filter(|slot| slot.groups.len() == 1).map(|slot| slot.groups.start);
+        self.spans.iter_mut().for_each(|span| span.runs.clear());
+        let single =
+            self.main_blocks.iter().filter(|main| main.groups.len() == 1).map(|main| main.groups.start);
         for p in single {
             let place = &self.places[p];
-            for &Part { segment, column, ref unknowns, .. } in &self.parts[place.parts.clone()] {
-                let Segment { unknowns: all, runs, .. } = &mut self.segments[segment];
+            for &Part { span, column, ref unknowns, .. } in &self.parts[place.parts.clone()] {
+                let SharedSpan { unknowns: all, runs, .. } = &mut self.spans[span];
                 if unknowns.len() < all.len() {
                     continue;
                 }
@@ -155,11 +154,11 @@ impl Batch {
                 }
             }
         }
-        let mut touching: SmallVec<[usize; 32]> = smallvec![0; self.segments.len()];
+        let mut touching: SmallVec<[usize; 32]> = smallvec![0; self.spans.len()];
         let parts = self.places.iter().flat_map(|place| &self.parts[place.parts.clone()]);
-        parts.for_each(|part| touching[part.segment] += 1);
-        for (segment, touching) in self.segments.iter_mut().zip(touching) {
-            segment.plain = segment.runs.iter().map(|run| run.places.len()).sum::<usize>() == touching;
+        parts.for_each(|part| touching[part.span] += 1);
+        for (span, touching) in self.spans.iter_mut().zip(touching) {
+            span.plain = span.runs.iter().map(|run| run.places.len()).sum::<usize>() == touching;
         }
     }
 }

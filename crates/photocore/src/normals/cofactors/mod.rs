@@ -1,11 +1,11 @@
 //! Cofactors of all unknowns and adjusted equations, from the selected inverse.
 
-mod others;
+mod coupled_inverse;
 
 use std::ops::Range;
 use std::time::Instant;
 
-use self::others::Others;
+use self::coupled_inverse::CoupledInverse;
 use super::equations::{Equations, RowBuffer};
 use super::incidence::Batches;
 use super::layout::Layout;
@@ -15,7 +15,7 @@ use super::workspace::zeros;
 use crate::context::Control;
 use crate::parallel;
 
-pub(super) use others::AtNode;
+pub(super) use coupled_inverse::NodeCofactors;
 
 /// Cofactors: required blocks of the inverse normal matrix. All blocks are square, row by row.
 #[derive(Debug, Clone)]
@@ -46,7 +46,7 @@ impl Cofactors {
         system: &System,
         equations: &dyn Equations,
         control: &Control,
-        found: &[AtNode],
+        found: &[NodeCofactors],
         [retained, pairs, information]: [Vec<f64>; 3],
     ) -> Option<Self> {
         let layout = &system.layout;
@@ -57,7 +57,7 @@ impl Cofactors {
             let mut values = at_node.equations.chunks_exact(rows.max(1));
             let mut blocks = at_node.local.chunks_exact(l * l).peekable();
             for &unit in system.incidence.units_at(index) {
-                if let Some(cofactors) = blocks.next_if(|_| !layout.is_apart(unit as usize)) {
+                if let Some(cofactors) = blocks.next_if(|_| !layout.is_uncoupled(unit as usize)) {
                     local[unit as usize * l * l..][..l * l].copy_from_slice(cofactors);
                 }
                 for (&group, values) in
@@ -88,7 +88,11 @@ impl Cofactors {
 }
 
 /// Collects the leverage matrices of groups from each supernode, and last of local blocks without equations; None if memory is insufficient.
-pub(super) fn leverages_of_groups(system: &System, control: &Control, found: &[AtNode]) -> Option<Vec<f64>> {
+pub(super) fn leverages_of_groups(
+    system: &System,
+    control: &Control,
+    found: &[NodeCofactors],
+) -> Option<Vec<f64>> {
     let layout = &system.layout;
     let size = layout.rows() * layout.rows();
     let mut leverages = control.allocated(zeros(layout.groups() * size))?;
@@ -105,7 +109,7 @@ pub(super) fn leverages_of_groups(system: &System, control: &Control, found: &[A
 /// Minimum number of local blocks at a supernode for several threads.
 const MANY: usize = 256;
 
-impl AtNode {
+impl NodeCofactors {
     /// Computes the cofactors at a supernode. `front` is the inverse over the rows of its front, full square, of order `height`.
     pub fn new(
         system: &System,
@@ -119,8 +123,8 @@ impl AtNode {
         let start = Instant::now();
         let layout = &system.layout;
         let batches = system.incidence.batches_at(index);
-        let others = || Others::new(by_group);
-        let part = |others: &mut Others, batches: Batches<'_>| {
+        let others = || CoupledInverse::new(by_group);
+        let part = |others: &mut CoupledInverse, batches: Batches<'_>| {
             let (mut batch, mut part) = (system.workspace.batch(), Self::default());
             for run in batches.iter().take_while(|_| !control.stopped()) {
                 batch.gather(equations, system, run);

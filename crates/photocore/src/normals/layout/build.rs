@@ -59,7 +59,7 @@ impl Layout {
             local_ties: Vec::new(),
             places: None,
             free: Vec::new(),
-            apart: Vec::new(),
+            uncoupled: Vec::new(),
             pairs: Vec::new(),
             pair_ptr: vec![0],
             outer: Vec::new(),
@@ -143,9 +143,9 @@ impl Layout {
     pub fn with_held(mut self, held: &[bool]) -> Self {
         let of_locals = held.get(self.all_locals()).unwrap_or_default().chunks_exact(self.local_dim);
         let known = of_locals.enumerate().filter(|(_, own)| !own.contains(&false)).map(|(local, _)| local);
-        let apart =
+        let uncoupled =
             known.flat_map(|local| self.groups_of(local).map(move |group| [group as u32, local as u32]));
-        self.apart = apart.collect();
+        self.uncoupled = uncoupled.collect();
         let of_retained = held.get(self.all_retained()).unwrap_or_default();
         if of_retained.contains(&true) {
             self.free =

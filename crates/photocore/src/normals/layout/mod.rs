@@ -40,7 +40,7 @@ pub struct Layout {
     /// Index ranges of the free unknowns of each retained block; empty if every unknown is free.
     free: Vec<Vec<Range<usize>>>,
     /// Groups of fixed local blocks, with their blocks.
-    apart: Vec<[u32; 2]>,
+    uncoupled: Vec<[u32; 2]>,
     /// Requested pairs of retained blocks, ascending; `pair_ptr` contains the offset of each block, and the end of the last.
     pairs: Vec<[u32; 2]>,
     pair_ptr: Vec<usize>,

@@ -11,36 +11,36 @@ use super::Layout;
 /// itself has no groups.
 impl Layout {
     pub(in crate::normals) fn units(&self) -> usize {
-        self.locals + self.apart.len()
+        self.locals + self.uncoupled.len()
     }
 
     /// Whether a unit is an independent group.
-    pub(in crate::normals) fn is_apart(&self, unit: usize) -> bool {
+    pub(in crate::normals) fn is_uncoupled(&self, unit: usize) -> bool {
         unit >= self.locals
     }
 
     /// Returns the local block of a unit.
     pub(in crate::normals) fn local_of(&self, unit: usize) -> usize {
-        unit.checked_sub(self.locals).map_or(unit, |apart| self.apart[apart][1] as usize)
+        unit.checked_sub(self.locals).map_or(unit, |uncoupled| self.uncoupled[uncoupled][1] as usize)
     }
 
     pub(in crate::normals) fn groups_of_unit(&self, unit: usize) -> Range<usize> {
-        if let Some(apart) = unit.checked_sub(self.locals) {
-            let group = self.apart[apart][0] as usize;
+        if let Some(uncoupled) = unit.checked_sub(self.locals) {
+            let group = self.uncoupled[uncoupled][0] as usize;
             return group..group + 1;
         }
         let own = self.groups_of(unit);
-        if self.stands_apart(unit) { own.start..own.start } else { own }
+        if self.has_uncoupled_groups(unit) { own.start..own.start } else { own }
     }
 
     /// Whether the groups of a local block are independent units, because the block is fixed.
-    pub fn stands_apart(&self, local: usize) -> bool {
-        !self.apart_of(local).is_empty()
+    pub fn has_uncoupled_groups(&self, local: usize) -> bool {
+        !self.uncoupled_of(local).is_empty()
     }
 
     /// Returns the independent groups of a local block, as unit numbers.
-    pub(in crate::normals) fn apart_of(&self, local: usize) -> Range<usize> {
-        let before = |end: usize| self.locals + self.apart.partition_point(|own| (own[1] as usize) < end);
+    pub(in crate::normals) fn uncoupled_of(&self, local: usize) -> Range<usize> {
+        let before = |end: usize| self.locals + self.uncoupled.partition_point(|own| (own[1] as usize) < end);
         before(local)..before(local + 1)
     }
 
@@ -60,7 +60,7 @@ impl Layout {
 
     /// Number of retained unknowns in the Schur complement of a unit; a main block is counted once per group.
     pub(in crate::normals) fn reduced_width(&self, unit: usize) -> usize {
-        if self.is_apart(unit) {
+        if self.is_uncoupled(unit) {
             return 0;
         }
         let groups = || self.groups_of_unit(unit);

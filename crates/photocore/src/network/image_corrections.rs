@@ -22,7 +22,7 @@ pub(super) struct Requirements<'a> {
 
 /// A correction of image positions.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Passage {
+pub enum ImageCorrection {
     /// Points of a bent board.
     Figure(Figure),
     /// Lens with free knots of its spline.
@@ -31,7 +31,7 @@ pub enum Passage {
     Scan(Scan),
 }
 
-impl Passage {
+impl ImageCorrection {
     /// Returns the correction of a named type from shared parameters, points, photos or cameras, and numbers. None for an unknown
     /// name or wrong counts.
     pub fn from_numbers(kind: &str, commons: &[usize], of: &[usize], numbers: &[f64]) -> Option<Self> {
@@ -159,7 +159,7 @@ pub(super) type ImageCommons = SmallVec<[usize; 32]>;
 
 /// Corrections of a model, indexed by their objects; empty without corrections.
 #[derive(Debug, Default)]
-pub(super) struct Passages {
+pub(super) struct ImageCorrections {
     figures: Vec<Figure>,
     /// Figure of each point of the model, and the index of the point there.
     of_point: Vec<Option<(usize, usize)>>,
@@ -173,30 +173,30 @@ pub(super) struct Passages {
     pub cells: Vec<usize>,
 }
 
-impl Passages {
+impl ImageCorrections {
     /// Returns the corrections of a network of `count` points, of which `points` are active, and photos with these cameras.
     pub fn new(
-        passages: &[Passage],
+        image_corrections: &[ImageCorrection],
         (points, count): (&[usize], usize),
         cameras: impl Iterator<Item = usize>,
     ) -> Self {
         let mut own = Self::default();
-        if passages.is_empty() {
+        if image_corrections.is_empty() {
             return own;
         }
         let cameras: Vec<usize> = cameras.collect();
         own.scan_of = vec![None; cameras.len()];
         let mut of_point = vec![None; count];
-        for passage in passages {
+        for passage in image_corrections {
             match passage {
-                Passage::Figure(figure) => {
+                ImageCorrection::Figure(figure) => {
                     let number = own.figures.len();
                     let places = figure.points.iter().enumerate();
                     places.for_each(|(k, &point)| of_point[point] = Some((number, k)));
                     own.figures.push(figure.clone());
                 }
-                Passage::Knots(knots) => own.lenses.push(knots.clone()),
-                Passage::Scan(scan) => {
+                ImageCorrection::Knots(knots) => own.lenses.push(knots.clone()),
+                ImageCorrection::Scan(scan) => {
                     own.scan_of[scan.photo] = Some(own.scans.len());
                     own.scans.push(scan.clone());
                 }

@@ -7,14 +7,14 @@ const ALIKE: f64 = 1e-6;
 
 /// History of full steps for Anderson acceleration.
 #[derive(Debug, Default)]
-pub(super) struct Secants {
+pub(super) struct AndersonHistory {
     /// Last step from the equations, and the values before it.
     pub last: Option<(Vec<f64>, Vec<f64>)>,
     /// Applied steps, each with the resulting change of the step; empty during fast convergence.
     pub pairs: Vec<(Vec<f64>, Vec<f64>)>,
 }
 
-impl Secants {
+impl AndersonHistory {
     /// Stores a full step and the values before it.
     pub fn remember(&mut self, step: Vec<f64>, before: Vec<f64>) {
         self.last = Some((step, before));
@@ -26,12 +26,12 @@ impl Secants {
     }
 
     /// Stores an applied step and the resulting change of the step; at most `most` pairs are stored.
-    pub fn keep(&mut self, taken: Vec<f64>, difference: Vec<f64>, most: usize) {
+    pub fn keep(&mut self, entries: Vec<f64>, difference: Vec<f64>, most: usize) {
         self.pairs.drain(..(self.pairs.len() + 1).saturating_sub(most));
-        self.pairs.push((taken, difference));
+        self.pairs.push((entries, difference));
     }
 
-    /// Returns the accelerated step: a linear combination of [`Secants::all`].
+    /// Returns the accelerated step: a linear combination of [`AndersonHistory::all`].
     pub fn corrected(&self, step: &[f64], shares: &DVector<f64>) -> Vec<f64> {
         let mut own = vec![0.0; step.len()];
         for (each, share) in self.all(step).into_iter().zip(shares) {
@@ -43,11 +43,11 @@ impl Secants {
     /// Returns the step, the differences and the applied steps.
     pub fn all<'s>(&'s self, step: &'s [f64]) -> Vec<&'s [f64]> {
         let differences = self.pairs.iter().map(|(_, difference)| &difference[..]);
-        let taken = self.pairs.iter().map(|(taken, _)| &taken[..]);
-        std::iter::once(step).chain(differences).chain(taken).collect()
+        let entries = self.pairs.iter().map(|(entries, _)| &entries[..]);
+        std::iter::once(step).chain(differences).chain(entries).collect()
     }
 
-    /// Returns the coefficients of the accelerated step in [`Secants::all`], from the products of these vectors.
+    /// Returns the coefficients of the accelerated step in [`AndersonHistory::all`], from the products of these vectors.
     pub fn shares(&self, products: &DMatrix<f64>) -> Option<DVector<f64>> {
         let count = self.pairs.len();
         let scale = DVector::from_fn(count, |i, _| products[(i + 1, i + 1)].sqrt().recip());

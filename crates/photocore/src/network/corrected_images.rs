@@ -6,12 +6,12 @@ use smallvec::{SmallVec, smallvec};
 
 use super::commons::{CommonState, InBlock};
 use super::film::{FilmOf, Read};
-use super::in_lanes::{FEWEST, Sight, write_in_lanes};
+use super::image_corrections::ImageCommons;
 use super::input::Image;
+use super::linearization_point::{LinearizationPoint, PhotoState};
 use super::model::Bundle;
 use super::mounts::Composed;
-use super::passages::ImageCommons;
-use super::stations::{Station, Stations};
+use super::simd::{FEWEST, ImageObservation, linearize_simd};
 use crate::geometry::camera::{LensDirection, Matrix2, SplinedStereographic, each_camera};
 use crate::geometry::{Camera, CameraModel, Matrix3, Vector3};
 use crate::normals::{Cofactors, GroupRows};
@@ -107,51 +107,54 @@ fn lead(by: &Matrix2, (from, columns): (&[f64], Range<usize>), (to, first): (&mu
 
 impl Bundle {
     /// Returns the shared parameters of the corrections of an image.
-    fn passed_by(&self, image: usize) -> ImageCommons {
+    fn correction_commons(&self, image: usize) -> ImageCommons {
         let photo = self.images[image].photo;
         let columns = splined(&self.cameras[photo]).map_or(0, SplinedStereographic::columns);
-        self.passages.commons((image, photo, self.point_of(image)), columns)
+        self.image_corrections.commons((image, photo, self.point_of(image)), columns)
     }
 
     /// Determines the active knots of all images at given parameter values, and counts the images that depend on each shared parameter.
-    pub(super) fn open_windows(&mut self, unknowns: &[f64]) {
-        if !self.passages.lenses().is_empty() {
+    pub(super) fn activate_knots(&mut self, unknowns: &[f64]) {
+        if !self.image_corrections.lenses().is_empty() {
             let windows = self.of_seen(unknowns, |own, u| own.window(u, MARGIN));
-            self.passages.open(windows);
+            self.image_corrections.open(windows);
         }
-        if self.passages.is_empty() {
+        if self.image_corrections.is_empty() {
             return;
         }
         // Number of images with equal corrections by photo, and one of them.
-        let mut alike = vec![(0, 0); self.cameras.len()];
-        let mut passing = vec![];
+        let mut proportional = vec![(0, 0); self.cameras.len()];
+        let mut corrected_images = vec![];
         for (index, image) in self.images.iter().enumerate() {
-            if self.pass_alike(image.photo) {
-                alike[image.photo] = (alike[image.photo].0 + 1, index);
+            if self.has_uniform_corrections(image.photo) {
+                proportional[image.photo] = (proportional[image.photo].0 + 1, index);
             } else {
-                passing.push((1, index));
+                corrected_images.push((1, index));
             }
         }
-        for (count, image) in alike.into_iter().chain(passing).filter(|&(count, _)| count > 0) {
-            self.passed_by(image).into_iter().for_each(|common| self.commons[common].uses += count);
+        for (count, image) in proportional.into_iter().chain(corrected_images).filter(|&(count, _)| count > 0)
+        {
+            self.correction_commons(image).into_iter().for_each(|common| self.commons[common].uses += count);
         }
     }
 
     /// Returns true if all images of a photo have the same retained blocks, independent of point and position.
-    pub(super) fn pass_alike(&self, photo: usize) -> bool {
-        let cells = || self.passages.film(photo).is_some_and(FilmOf::has_cells);
-        let apart = || self.passages.have_figures() || self.passages.lens(photo).is_some() || cells();
-        !self.mounts.are_timed(photo) && (self.passages.is_empty() || !apart())
+    pub(super) fn has_uniform_corrections(&self, photo: usize) -> bool {
+        let cells = || self.image_corrections.film(photo).is_some_and(FilmOf::has_cells);
+        let difference = || {
+            self.image_corrections.have_figures() || self.image_corrections.lens(photo).is_some() || cells()
+        };
+        !self.mounts.are_timed(photo) && (self.image_corrections.is_empty() || !difference())
     }
 
     /// Returns the number of images whose knots are outside their active knots.
-    pub(super) fn beyond_windows(&self, unknowns: &[f64]) -> usize {
-        if self.passages.lenses().is_empty() {
+    pub(super) fn images_beyond_knots(&self, unknowns: &[f64]) -> usize {
+        if self.image_corrections.lenses().is_empty() {
             return 0;
         }
         let patches = self.of_seen(unknowns, |own, u| own.patch(u));
         let is_beyond = |&(image, patch): &(usize, &Option<_>)| {
-            let window = self.passages.window(image);
+            let window = self.image_corrections.window(image);
             patch.as_ref().is_some_and(|patch| window.is_none_or(|window| !window.has(patch)))
         };
         patches.iter().enumerate().filter(is_beyond).count()
@@ -163,14 +166,14 @@ impl Bundle {
         unknowns: &[f64],
         take: impl Fn(&SplinedStereographic, &Vector3) -> Option<T> + Sync,
     ) -> Vec<Option<T>> {
-        let stations = self.evaluated(unknowns);
+        let linearization = self.evaluated(unknowns);
         let of_point = |point: usize| {
             let images = self.point_images.start[point]..self.point_images.start[point + 1];
             let of_image = |image: usize| {
                 let photo = self.images[image].photo;
-                self.passages.lens(photo)?;
-                let camera = splined(&stations.photos[photo].camera)?;
-                take(camera, &self.sight_bent(&stations, image, point))
+                self.image_corrections.lens(photo)?;
+                let camera = splined(&linearization.photos[photo].camera)?;
+                take(camera, &self.corrected_sight(&linearization, image, point))
             };
             images.map(of_image).collect::<Vec<_>>()
         };
@@ -178,13 +181,13 @@ impl Bundle {
     }
 
     /// Returns the distinct retained blocks of the corrections of an image, without the main one.
-    pub(super) fn blocks_of_passages(&self, image: usize) -> SmallVec<[usize; 32]> {
+    pub(super) fn blocks_of_image_corrections(&self, image: usize) -> SmallVec<[usize; 32]> {
         let mut blocks = SmallVec::new();
-        if self.passages.is_empty() {
+        if self.image_corrections.is_empty() {
             return blocks;
         }
         let main = self.main_block(image);
-        for common in self.passed_by(image) {
+        for common in self.correction_commons(image) {
             if let Some(place) = self.blocks.of_common[common]
                 && place.block != main
                 && !blocks.contains(&place.block)
@@ -207,7 +210,7 @@ impl Bundle {
             first
         };
         let poses = place(&mut self.blocks_of_pose(photo, self.time_of(image)).skip(1), 0);
-        let camera = place(&mut self.blocks_of_passages(image).into_iter(), poses);
+        let camera = place(&mut self.blocks_of_image_corrections(image).into_iter(), poses);
         let main = if block == photo { self.of_photo(photo) } else { self.of_block(block) }.len();
         ImageColumns { slots, main, poses, camera, all }
     }
@@ -215,82 +218,82 @@ impl Bundle {
     /// Writes the equations of an image with corrections into `rows`. It is not inlined, so that plain images do not pay for it; `own` is
     /// reused storage for the pose.
     #[inline(never)]
-    pub(super) fn observe_bent(
+    pub(super) fn write_corrected(
         &self,
-        stations: &Stations,
+        linearization: &LinearizationPoint,
         group: usize,
         local: usize,
         rows: &mut GroupRows<'_>,
         own: &mut Composed,
     ) {
-        if self.passages.is_empty() {
-            let timed = self.compose_timed(stations, group, own);
-            return stations.write(self.space, timed.then_some(&*own), &self.images[group], local, rows);
+        if self.image_corrections.is_empty() {
+            let timed = self.compose_timed(linearization, group, own);
+            return linearization.write(self.space, timed.then_some(&*own), &self.images[group], local, rows);
         }
         // With corrections, the equations follow from those of pose, point and camera.
         let columns = self.columns(group, rows.shared.len() / 2);
         columns.with_plain(1, |plain| {
-            let timed = self.compose_timed(stations, group, own).then_some(&*own);
-            stations.write(self.space, timed, &self.images[group], local, plain);
-            self.pass(stations, (group, local), &columns, plain, rows, &mut Read::default());
+            let timed = self.compose_timed(linearization, group, own).then_some(&*own);
+            linearization.write(self.space, timed, &self.images[group], local, plain);
+            self.pass(linearization, (group, local), &columns, plain, rows, &mut Read::default());
         });
     }
 
     /// Writes the equations of images of one photo with equal blocks in one batch; returns false if this is impossible.
-    pub(super) fn observe_all_passing(
+    pub(super) fn write_corrected_batch(
         &self,
-        stations: &Stations,
+        linearization: &LinearizationPoint,
         locals: &[u32],
         groups: &[u32],
         rows: &mut GroupRows<'_>,
     ) -> bool {
         let (first, count) = (groups[0] as usize, groups.len());
-        if self.passages.is_empty() || stations.mounted.is_some() || count < FEWEST {
+        if self.image_corrections.is_empty() || linearization.mounted.is_some() || count < FEWEST {
             return false;
         }
         let columns = self.columns(first, rows.shared.len() / (2 * count));
         columns.with_plain(count, |plain| {
-            if !self.place_in_lanes(stations, locals, groups, plain) {
+            if !self.linearize_plain_simd(linearization, locals, groups, plain) {
                 for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
                     let image = &self.images[group as usize];
-                    stations.write(self.space, None, image, local as usize, &mut plain.part(t, count));
+                    linearization.write(self.space, None, image, local as usize, &mut plain.part(t, count));
                 }
             }
             let mut read = Read::default();
             for (t, (&local, &group)) in locals.iter().zip(groups).enumerate() {
                 let (image, own) = ((group as usize, local as usize), &mut rows.part(t, count));
-                self.pass(stations, image, &columns, &plain.part(t, count), own, &mut read);
+                self.pass(linearization, image, &columns, &plain.part(t, count), own, &mut read);
             }
         });
         true
     }
 
     /// Writes the equations of pose, point and camera of images of one photo by SIMD; returns false if this is impossible.
-    fn place_in_lanes(
+    fn linearize_plain_simd(
         &self,
-        stations: &Stations,
+        linearization: &LinearizationPoint,
         locals: &[u32],
         groups: &[u32],
         plain: &mut GroupRows<'_>,
     ) -> bool {
         let photo = self.images[groups[0] as usize].photo;
-        let Station { orientation, camera } = &stations.photos[photo];
-        let scanned = stations.film(photo).is_some();
-        let sight = |t: usize| {
+        let PhotoState { orientation, camera } = &linearization.photos[photo];
+        let scanned = linearization.film(photo).is_some();
+        let to_camera_frame = |t: usize| {
             let image = if scanned { &NOWHERE } else { &self.images[groups[t] as usize] };
-            Sight { point: &stations.points[locals[t] as usize], image, sd: [1.0; 2] }
+            ImageObservation { point: &linearization.points[locals[t] as usize], image, sd: [1.0; 2] }
         };
-        stations.refracted.is_none()
+        linearization.refracted.is_none()
             && each_camera!(camera, camera => {
                 (!scanned || is_forward(camera))
-                    && write_in_lanes(orientation, camera, groups.len(), &sight, plain)
+                    && linearize_simd(orientation, camera, groups.len(), &to_camera_frame, plain)
             })
     }
 
     /// Writes the equations of an image, given the equations of pose, point and camera.
     fn pass(
         &self,
-        stations: &Stations,
+        linearization: &LinearizationPoint,
         (group, local): (usize, usize),
         columns: &ImageColumns,
         plain: &GroupRows<'_>,
@@ -298,17 +301,17 @@ impl Bundle {
         read: &mut Read,
     ) {
         let photo = self.images[group].photo;
-        let (Some(film), Some(at)) = (self.passages.film(photo), stations.film(photo)) else {
+        let (Some(film), Some(at)) = (self.image_corrections.film(photo), linearization.film(photo)) else {
             columns.spread(plain, &UNIT, rows);
             rows.constant.copy_from_slice(plain.constant);
-            self.step_figure(local, columns, rows);
-            return self.step_knots(stations, group, local, columns, rows);
+            self.add_figure_partials(local, columns, rows);
+            return self.add_knot_partials(linearization, group, local, columns, rows);
         };
-        let cell = self.passages.cell(group);
+        let cell = self.image_corrections.cell(group);
         at.read([-plain.constant[0], -plain.constant[1]], cell, read);
         columns.spread(plain, &read.reading.by_q, rows);
         (0..2).for_each(|k| rows.constant[k] = self.images[group].xy[k] - read.reading.xy[k]);
-        self.step_figure(local, columns, rows);
+        self.add_figure_partials(local, columns, rows);
         let commons = film.commons(cell);
         film.partials(read, |slot, by| {
             let common = commons[slot].0;
@@ -320,36 +323,37 @@ impl Bundle {
     }
 
     /// Determines the pattern cells of all images at the given values.
-    pub(super) fn find_cells(&mut self) {
-        let grid = |photo| self.passages.film(photo).is_some_and(FilmOf::has_cells);
+    pub(super) fn assign_cells(&mut self) {
+        let grid = |photo| self.image_corrections.film(photo).is_some_and(FilmOf::has_cells);
         if !(0..self.cameras.len()).any(grid) {
             return;
         }
         let given: Vec<CommonState> =
             self.commons.iter().map(|own| own.at(&vec![0.0; own.kind.unknowns().len()])).collect();
-        let films = self.passages.films(&given);
+        let films = self.image_corrections.films(&given);
         let cell =
             |image: &Image| films[image.photo].as_ref().map_or(0, |film| film.cell_of_reading(image.xy));
-        self.passages.cells = self.images.iter().map(cell).collect();
+        self.image_corrections.cells = self.images.iter().map(cell).collect();
     }
 
     /// Adds the partials by the knots of a lens.
-    fn step_knots(
+    fn add_knot_partials(
         &self,
-        stations: &Stations,
+        linearization: &LinearizationPoint,
         group: usize,
         local: usize,
         columns: &ImageColumns,
         rows: &mut GroupRows<'_>,
     ) {
         let photo = self.images[group].photo;
-        let (lens, camera) = (self.passages.lens(photo), splined(&stations.photos[photo].camera));
+        let (lens, camera) =
+            (self.image_corrections.lens(photo), splined(&linearization.photos[photo].camera));
         let (Some(lens), Some(camera)) = (lens, camera) else { return };
-        let Some(patch) = camera.patch(&self.sight_bent(stations, group, local)) else { return };
+        let Some(patch) = camera.patch(&self.corrected_sight(linearization, group, local)) else { return };
         let [fx, fy, ..] = camera.parameters();
         let mut last = 0;
         for (knot, weight) in patch.knots(camera.columns()) {
-            let place = self.blocks.of_common[self.passages.lenses()[lens].commons[knot]];
+            let place = self.blocks.of_common[self.image_corrections.lenses()[lens].commons[knot]];
             if let Some((InBlock { first, .. }, slot)) =
                 place.and_then(|place| Some((place, columns.slot(place.block, last)?)))
             {
@@ -361,8 +365,8 @@ impl Bundle {
     }
 
     /// Adds the partials by the parameters of a figure: the partials by the point times its displacement vectors.
-    fn step_figure(&self, local: usize, columns: &ImageColumns, rows: &mut GroupRows<'_>) {
-        let Some((figure, k)) = self.passages.figure(local) else { return };
+    fn add_figure_partials(&self, local: usize, columns: &ImageColumns, rows: &mut GroupRows<'_>) {
+        let Some((figure, k)) = self.image_corrections.figure(local) else { return };
         let Some(place) = self.blocks.of_common[figure.common] else { return };
         let by_point: [f64; 2 * 3] = std::array::from_fn(|i| rows.local[i]);
         for (number, shift) in figure.shifts[k].column_iter().enumerate() {
@@ -372,14 +376,14 @@ impl Bundle {
     }
 
     /// Returns coordinates and cofactors of a point that a figure displaces; None for others. `unknowns` contains the parameters of
-    /// [`Bundle::of_stations`].
+    /// [`Bundle::parameter_unknowns`].
     pub(super) fn shifted(
         &self,
         point: usize,
         unknowns: &[f64],
         cofactors: Option<&Cofactors>,
     ) -> Option<([f64; 3], Matrix3)> {
-        let (figure, k) = self.passages.figure(point)?;
+        let (figure, k) = self.image_corrections.figure(point)?;
         let (given, shifts) = (self.points[point].coordinates, figure.shifts[k]);
         let shift = figure.shift(k, &self.common_state(figure.common, unknowns).vector());
         let own = cofactors.map(|all| self.cofactors_of_common(all, figure.common));

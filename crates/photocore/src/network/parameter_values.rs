@@ -1,8 +1,8 @@
 //! Parameters of photos, shared cameras and shared parameters before the adjustment: values, observed values, standard deviations.
 
 use super::input::{Camera, Network, Photo};
+use super::interface::{BlockId, Interface};
 use super::model::Bundle;
-use super::surroundings::{BlockOf, Surroundings};
 use crate::adjustment::median;
 use crate::geometry::{ObjectSpace, Orientation, POSE, PoseNumbers, Vector3, nearest_turns};
 
@@ -38,16 +38,16 @@ impl Network {
 
     /// Returns the standard deviations of photos, shared cameras and shared parameters; zero for `unused` and carried photos, for cameras
     /// of such photos only, and for shared parameters without active observations.
-    pub(super) fn station_sd(
+    pub(super) fn parameter_sd(
         &self,
         model: &Bundle,
-        surroundings: &Surroundings,
+        interface: &Interface,
         unused: impl Fn(usize) -> bool,
     ) -> Vec<f64> {
         let mut all = Vec::new();
         let mut used = vec![false; self.cameras.len()];
-        surroundings.indices(BlockOf::Camera).into_iter().for_each(|camera| used[camera] = true);
-        let (commons, photos) = (surroundings.indices(BlockOf::Common), surroundings.indices(BlockOf::Photo));
+        interface.indices(BlockId::Camera).into_iter().for_each(|camera| used[camera] = true);
+        let (commons, photos) = (interface.indices(BlockId::Common), interface.indices(BlockId::Photo));
         let of_commons = |own: &[usize], elsewhere: bool| {
             let of_common = |&common: &usize| {
                 let is_used = elsewhere || model.commons[common].uses > 0 || commons.contains(&common);
@@ -70,7 +70,7 @@ impl Network {
     }
 
     /// Returns the values of photos at given poses, shared cameras and shared parameters.
-    pub(super) fn station_values(&self, model: &Bundle, pose: impl Fn(&Photo) -> [f64; POSE]) -> Vec<f64> {
+    pub(super) fn parameter_values(&self, model: &Bundle, pose: impl Fn(&Photo) -> [f64; POSE]) -> Vec<f64> {
         let mut all = Vec::new();
         for (index, photo) in self.photos.iter().enumerate() {
             all.extend(pose(photo));
@@ -81,7 +81,7 @@ impl Network {
             all.resize(all.len() + model.of_block(index).len() - model.of_photo(index).len(), 0.0);
         }
         all.extend(model.blocks.shared.iter().flat_map(|&camera| self.cameras[camera].camera.parameters()));
-        all.resize(model.of_stations().len(), 0.0);
+        all.resize(model.parameter_unknowns().len(), 0.0);
         all
     }
 

@@ -12,8 +12,8 @@ use crate::normals::GroupRows;
 
 /// Photos, shared parameters and points at given parameter values.
 #[derive(Debug)]
-pub struct Stations {
-    pub photos: Vec<Station>,
+pub struct LinearizationPoint {
+    pub photos: Vec<PhotoState>,
     pub commons: Vec<CommonState>,
     /// None without mounts.
     pub mounted: Option<Mounted>,
@@ -39,7 +39,7 @@ pub struct Mounted {
 
 /// A photo at given parameter values.
 #[derive(Debug, Clone)]
-pub struct Station {
+pub struct PhotoState {
     pub orientation: Orientation,
     pub camera: Camera,
 }
@@ -59,7 +59,7 @@ impl Mounted {
     }
 }
 
-impl Stations {
+impl LinearizationPoint {
     /// Returns the approximate standard deviations of an image in the unit of its camera.
     pub fn sd_in_camera(&self, image: &Image) -> [f64; 2] {
         image.sd.map(|sd| self.film(image.photo).map_or(sd, |film| sd / film.units()))
@@ -111,8 +111,8 @@ impl Stations {
         };
         let from = timed.map(|_| refraction.vertical(space, space.coordinates(orientation.centre())));
         let from = from.as_ref().unwrap_or(&at_photos[photo]);
-        let lift = refraction.lift(orientation, from, point, &at_points[local]);
-        take(&orientation.under(&lift), &point.lifted(&lift))
+        let offset = refraction.offset(orientation, from, point, &at_points[local]);
+        take(&orientation.with_offset(&offset), &point.with_offset(&offset))
     }
 }
 
@@ -126,7 +126,7 @@ pub fn write<C: CameraModel>(
     measured: Option<[f64; 2]>,
     rows: &mut GroupRows<'_>,
 ) {
-    let u = orientation.sight(point);
+    let u = orientation.to_camera_frame(point);
     let (residual, computed) = match measured {
         None if C::LENS == LensDirection::Backward => {
             let place = camera.linearize(&u);

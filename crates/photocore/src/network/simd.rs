@@ -17,7 +17,7 @@ const PARAMETERS: usize = 16;
 type Lanes = [f64; LANES];
 
 /// A point, its image observation, and the standard deviations.
-pub(super) struct Sight<'a> {
+pub(super) struct ImageObservation<'a> {
     pub point: &'a geometry::Point,
     pub image: &'a Image,
     pub sd: [f64; 2],
@@ -25,11 +25,11 @@ pub(super) struct Sight<'a> {
 
 /// Writes the whitened equations of `count` images of one photo; returns false if the camera or pose does not support SIMD.
 #[inline(always)]
-pub(super) fn write_in_lanes<'s, C: CameraModel>(
+pub(super) fn linearize_simd<'s, C: CameraModel>(
     orientation: &Orientation,
     camera: &C,
     count: usize,
-    sight: &impl Fn(usize) -> Sight<'s>,
+    to_camera_frame: &impl Fn(usize) -> ImageObservation<'s>,
     rows: &mut GroupRows<'_>,
 ) -> bool {
     if C::IN_LANES
@@ -41,7 +41,7 @@ pub(super) fn write_in_lanes<'s, C: CameraModel>(
             let own = LANES.min(count - first);
             // Results of unused lanes are computed but ignored.
             for t in 0..own {
-                lanes.put(t, &sight(first + t));
+                lanes.put(t, &to_camera_frame(first + t));
             }
             write(pose, camera, &lanes, first..first + own, count, rows);
         }
@@ -60,13 +60,13 @@ struct Input {
 
 impl Input {
     #[inline(always)]
-    fn put(&mut self, t: usize, sight: &Sight<'_>) {
-        let position = sight.point.position();
+    fn put(&mut self, t: usize, to_camera_frame: &ImageObservation<'_>) {
+        let position = to_camera_frame.point.position();
         for k in 0..3 {
             self.point[k][t] = position[k];
         }
         for k in 0..2 {
-            (self.image[k][t], self.sd[k][t]) = (sight.image.xy[k], sight.sd[k]);
+            (self.image[k][t], self.sd[k][t]) = (to_camera_frame.image.xy[k], to_camera_frame.sd[k]);
         }
     }
 }
@@ -144,7 +144,7 @@ impl<C: CameraModel> WithSimd for Compute<'_, '_, C> {
         let Input { point, image, sd } = *input;
         let (mut x, mut y) = (LaneColumns::ZERO, LaneColumns::ZERO);
         for t in 0..LANES {
-            let u = pose.sight(&Vector3::new(point[0][t], point[1][t], point[2][t]));
+            let u = pose.to_camera_frame(&Vector3::new(point[0][t], point[1][t], point[2][t]));
             let (residual, computed) = camera.compare(&u, [image[0][t], image[1][t]]);
             // Unrolled: a loop would store them in memory.
             let [by_x, by_y] = &computed.by_parameters;
@@ -207,22 +207,23 @@ mod tests {
         let images: Vec<Image> = points
             .iter()
             .map(|point| {
-                let [x, y] = camera.image(&orientation.sight(point));
+                let [x, y] = camera.image(&orientation.to_camera_frame(point));
                 Image { photo: 0, point: 0, xy: [x + 0.01, y - 0.02], sd: [0.004, 0.005] }
             })
             .collect();
-        let sight = |t: usize| Sight { point: &points[t], image: &images[t], sd: images[t].sd };
+        let to_camera_frame =
+            |t: usize| ImageObservation { point: &points[t], image: &images[t], sd: images[t].sd };
         let parameters = camera.parameters().len();
         let found = rows_of(count, parameters, |rows| {
             let written = crate::geometry::camera::each_camera!(
-                camera, camera => write_in_lanes(orientation, camera, count, &sight, rows)
+                camera, camera => linearize_simd(orientation, camera, count, &to_camera_frame, rows)
             );
             assert!(written, "{}", camera.name());
         });
         let expected = rows_of(count, parameters, |rows| {
             for t in 0..count {
-                let Sight { point, image, sd } = sight(t);
-                let u = orientation.sight(point);
+                let ImageObservation { point, image, sd } = to_camera_frame(t);
+                let u = orientation.to_camera_frame(point);
                 let (residual, computed) = camera.compare(&u, image.xy);
                 let projection = orientation.projection(
                     &u,
@@ -275,12 +276,13 @@ mod tests {
         let image = Image { photo: 0, point: 0, xy: [1.0, 2.0], sd: [0.004; 2] };
         let excluded = [f64::INFINITY; 2];
         let sights = [(&point, image.sd), (&at_centre, excluded), (&point, [image.sd[0], f64::INFINITY])];
-        let sight = |t: usize| Sight { point: sights[t].0, image: &image, sd: sights[t].1 };
+        let to_camera_frame =
+            |t: usize| ImageObservation { point: sights[t].0, image: &image, sd: sights[t].1 };
         let mut parts = [1, 3, POSE, 1].map(|width| vec![f64::NAN; 2 * sights.len() * width]);
         let [constant, local, retained, shared] = &mut parts;
         let mut rows = GroupRows { constant, local, retained, shared };
         assert!(crate::geometry::camera::each_camera!(
-            &camera, camera => write_in_lanes(&orientation, camera, sights.len(), &sight, &mut rows)
+            &camera, camera => linearize_simd(&orientation, camera, sights.len(), &to_camera_frame, &mut rows)
         ));
         for part in parts {
             let rows: Vec<&[f64]> = part.chunks_exact(part.len() / 6).collect();
@@ -343,11 +345,15 @@ mod tests {
         let attitude: Matrix3 = rotation([0.02, -0.03, 1.1]).transpose();
         let orientation = Orientation::stepping(ObjectSpace::Rectangular, [3.0, -4.0, 150.0], &attitude);
         let point = Point::new(ObjectSpace::Rectangular, [1.0, 2.0, 3.0]);
-        let image =
-            Image { photo: 0, point: 0, xy: camera.image(&orientation.sight(&point)), sd: [0.004; 2] };
-        let sight = |_| Sight { point: &point, image: &image, sd: image.sd };
+        let image = Image {
+            photo: 0,
+            point: 0,
+            xy: camera.image(&orientation.to_camera_frame(&point)),
+            sd: [0.004; 2],
+        };
+        let to_camera_frame = |_| ImageObservation { point: &point, image: &image, sd: image.sd };
         let found = rows_of(FEWEST, PARAMETERS + 1, |rows| {
-            assert!(!write_in_lanes(&orientation, &camera, FEWEST, &sight, rows));
+            assert!(!linearize_simd(&orientation, &camera, FEWEST, &to_camera_frame, rows));
         });
         assert!(found.iter().all(|&value| value == 0.0));
     }

@@ -8,7 +8,7 @@ use super::linearized::{Inverted, Linearized};
 use super::loss::{Loss, Reweighting};
 use super::options::{Options, Status};
 use super::problem::AnyProblem;
-use super::result::{AdjustError, Adjustment, Effort, Seconds};
+use super::result::{AdjustError, Adjustment, PhaseTimes, SolverStats};
 use crate::normals::{FactorOptions, InvertOptions};
 use crate::{Context, Threads};
 
@@ -46,10 +46,10 @@ impl Adjustment {
             datum: vec![],
             weak: vec![],
             collapsed: vec![],
-            effort: Effort {
+            effort: SolverStats {
                 operations: symbolic.operations(problem.layout()),
                 formations: 0,
-                seconds: Seconds::default(),
+                seconds: PhaseTimes::default(),
                 ordering: symbolic.ordering(),
                 predictions: symbolic.predictions().to_vec(),
                 order: symbolic.order().to_vec(),

@@ -3,13 +3,13 @@
 use pulp::{NullaryFnOnce, Simd};
 use smallvec::{SmallVec, smallvec};
 
-use crate::normals::batch::{Batch, Part, Slot};
+use crate::normals::batch::{Batch, MainBlock, Part};
 use crate::normals::layout::Layout;
 use crate::normals::vectorised::{Kernel, LANES, Rows, add_rows, copy_few, dot, run, size};
 
 /// Cofactors of the local blocks at one supernode and of their equations, in the order of the incidence.
 #[derive(Default)]
-pub(in crate::normals) struct AtNode {
+pub(in crate::normals) struct NodeCofactors {
     pub local: Vec<f64>,
     pub equations: Vec<f64>,
     /// Leverage matrices of the ties at this supernode, in order.
@@ -22,7 +22,7 @@ pub(in crate::normals) struct AtNode {
 
 /// Inverse over all unknowns coupled to the local blocks of a batch: main blocks in the order of the slots, then segments.
 #[derive(Default)]
-pub(super) struct Others {
+pub(super) struct CoupledInverse {
     /// First row in the front, first row here and width of each block.
     strips: Vec<(usize, usize, usize)>,
     width: usize,
@@ -59,23 +59,23 @@ impl<'a> Tied<'a> {
 #[derive(Clone, Copy)]
 struct Group<'a> {
     t: usize,
-    slot: &'a Slot,
+    main: &'a MainBlock,
     start: usize,
     k: usize,
     p: usize,
     rows: usize,
 }
 
-impl Others {
+impl CoupledInverse {
     pub fn new(by_group: bool) -> Self {
         Self { by_group, ..Self::default() }
     }
 
     /// Collects the inverse over the unknowns coupled to a batch; reused if the previous batch has the same.
     pub fn gather(&mut self, batch: &Batch, front: &[f64], height: usize) {
-        let slots = batch.slots.iter().map(|slot| (slot.row, slot.dim));
-        let segments = batch.segments.iter().map(|segment| (segment.row, segment.unknowns.len()));
-        let all = slots.chain(segments);
+        let main_blocks = batch.main_blocks.iter().map(|main| (main.row, main.dim));
+        let spans = batch.spans.iter().map(|span| (span.row, span.unknowns.len()));
+        let all = main_blocks.chain(spans);
         if self.strips.iter().map(|&(row, _, width)| (row, width)).eq(all.clone()) {
             return;
         }
@@ -104,7 +104,7 @@ impl Others {
 
     /// Computes cofactors. With H = N_ll^-1 N_lo and Q_oo the inverse over the others o: Q_ll = N_ll^-1 + H Q_oo H^T, Q_lo = -H Q_oo, and a
     /// Q a^T for each equation.
-    pub fn cofactors(&mut self, batch: &Batch, layout: &Layout, found: &mut AtNode) {
+    pub fn cofactors(&mut self, batch: &Batch, layout: &Layout, found: &mut NodeCofactors) {
         run(layout, batch.retained_dim(), Find { others: self, batch, rows: layout.rows(), found });
     }
 
@@ -115,17 +115,17 @@ impl Others {
         batch: &Batch,
         t: usize,
         rows: usize,
-        found: &mut AtNode,
+        found: &mut NodeCofactors,
     ) {
         let rows = size::<R>(rows);
-        let own = if batch.apart {
+        let own = if batch.uncoupled {
             self.without_local::<L>()
         } else {
             simd.vectorize(OfLocal::<S, L> { simd, others: self, batch, t, found })
         };
-        for (slot, &(_, start, _)) in batch.slots.iter().zip(&self.strips) {
-            for (k, p) in slot.groups.clone().enumerate() {
-                let group = Group { t, slot, start, k, p, rows };
+        for (main, &(_, start, _)) in batch.main_blocks.iter().zip(&self.strips) {
+            for (k, p) in main.groups.clone().enumerate() {
+                let group = Group { t, main, start, k, p, rows };
                 self.equations::<S, L, D>(simd, batch, group, &own, found);
             }
         }
@@ -139,7 +139,7 @@ impl Others {
         batch: &Batch,
         group: Group<'_>,
         own: &[[f64; L]; L],
-        found: &mut AtNode,
+        found: &mut NodeCofactors,
     ) {
         let (rows, last) = (group.rows, group.rows - 1);
         let (diagonal, block) = (found.equations.len(), found.leverages.len());
@@ -177,9 +177,9 @@ impl Others {
     fn reduce<const L: usize>(&mut self, batch: &Batch, t: usize) {
         let stride = self.stride;
         self.h.resize(L * stride, 0.0);
-        let slots = batch.slots.iter().map(|slot| batch.slot_coupling::<0>(slot, L));
-        let segments = batch.segments.iter().map(|segment| batch.segment_coupling(segment, L));
-        for (v, &(_, start, _)) in slots.chain(segments).zip(&self.strips) {
+        let main_blocks = batch.main_blocks.iter().map(|main| batch.main_coupling::<0>(main, L));
+        let spans = batch.spans.iter().map(|span| batch.span_coupling(span, L));
+        for (v, &(_, start, _)) in main_blocks.chain(spans).zip(&self.strips) {
             for d in 0..L {
                 let row = &v.rows.values[(t * L + d) * v.rows.width..][..v.rows.width];
                 copy_few(row, &mut self.h[d * stride + start..][..row.len()]);
@@ -243,7 +243,7 @@ impl Others {
         simd: S,
         batch: &Batch,
         t: usize,
-        found: &mut AtNode,
+        found: &mut NodeCofactors,
     ) -> [[f64; L]; L] {
         let mut own = [[0.0; L]; L];
         for a in 0..L {
@@ -276,12 +276,12 @@ impl Others {
         picked: [usize; 2],
         own: &[[f64; L]; L],
     ) -> [[f64; 2]; 2] {
-        let Group { t, slot, start, k, p, rows } = group;
-        let dim = size::<D>(slot.dim);
+        let Group { t, main, start, k, p, rows } = group;
+        let dim = size::<D>(main.dim);
         let local = batch.local_rows::<L>(t, p, rows);
         let local = picked.map(|row| &local[row]);
-        let at = (t * slot.groups.len() + k) * rows;
-        let coefficients = &batch.slot_rows::<D>(slot, rows).rows.values[at * dim..];
+        let at = (t * main.groups.len() + k) * rows;
+        let coefficients = &batch.main_rows::<D>(main, rows).rows.values[at * dim..];
         let retained = Tied { start, width: dim, x: picked.map(|row| &coefficients[row * dim..]) };
         let mut form = [[simd.splat_f64s(0.0); 2]; 2];
         self.tied(simd, &mut form, local, &[], retained);
@@ -311,7 +311,7 @@ impl Others {
         part: &Part,
     ) -> Tied<'s> {
         let Rows { values, width, stride, .. } = batch.part_rows(p, part, t * rows..(t + 1) * rows).rows;
-        let start = self.strips[batch.slots.len() + part.segment].1 + part.shift;
+        let start = self.strips[batch.main_blocks.len() + part.span].1 + part.shift;
         Tied { start, width, x: picked.map(|row| &values[row * stride..]) }
     }
 
@@ -356,10 +356,10 @@ impl Others {
 /// Computation of Q_ll, H and H Q of a local block, compiled once for all sizes of retained blocks.
 struct OfLocal<'a, S, const L: usize> {
     simd: S,
-    others: &'a mut Others,
+    others: &'a mut CoupledInverse,
     batch: &'a Batch,
     t: usize,
-    found: &'a mut AtNode,
+    found: &'a mut NodeCofactors,
 }
 
 impl<S: Simd, const L: usize> NullaryFnOnce for OfLocal<'_, S, L> {
@@ -377,7 +377,7 @@ impl<S: Simd, const L: usize> NullaryFnOnce for OfLocal<'_, S, L> {
 /// Contribution of shared coefficients to the leverages of two rows of a group, compiled once for all sizes.
 struct OfShared<'a, 'b, S: Simd, const L: usize> {
     simd: S,
-    others: &'a Others,
+    others: &'a CoupledInverse,
     batch: &'b Batch,
     group: Group<'b>,
     picked: [usize; 2],
@@ -405,10 +405,10 @@ impl<S: Simd, const L: usize> NullaryFnOnce for OfShared<'_, '_, S, L> {
 const PLACES: [f64; LANES] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0];
 
 struct Find<'a> {
-    others: &'a mut Others,
+    others: &'a mut CoupledInverse,
     batch: &'a Batch,
     rows: usize,
-    found: &'a mut AtNode,
+    found: &'a mut NodeCofactors,
 }
 
 impl Kernel for Find<'_> {
