@@ -29,7 +29,7 @@ mod refraction;
 mod shared_cameras;
 mod slow_steps;
 mod splined_camera;
-mod ties;
+mod terms;
 mod trajectories;
 
 /// Returns deterministic noise from incommensurable angles.

@@ -9,7 +9,7 @@ use faer::Mat;
 use faer::linalg::solvers::Solve;
 use photocore::normals::{
     Chord, Equations, Factor, FactorOptions, Function, GroupRows, InvertOptions, Layout, LayoutError,
-    Ordering, Prior, SelectedInverse, SolveOptions, System, SystemError, Tie,
+    Ordering, Prior, SelectedInverse, SolveOptions, System, SystemError, Term,
 };
 use photocore::{Context, Threads};
 use proptest::prelude::*;
@@ -44,11 +44,11 @@ impl Equations for Dense {
         }
     }
 
-    fn write_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
-        let columns: Vec<usize> = self.layout.tie_columns(tie).collect();
-        for (k, row) in self.layout.equations_of_tie(tie).enumerate() {
+    fn write_term(&self, term: usize, rows: &mut GroupRows<'_>) {
+        let columns: Vec<usize> = self.layout.term_columns(term).collect();
+        for (k, row) in self.layout.equations_of_term(term).enumerate() {
             rows.constant[k] = self.right[row];
-            for (value, &column) in rows.of_tie()[k * columns.len()..].iter_mut().zip(&columns) {
+            for (value, &column) in rows.of_term()[k * columns.len()..].iter_mut().zip(&columns) {
                 *value = self.matrix[(row, column)];
             }
         }
@@ -72,14 +72,14 @@ impl Dense {
         layout.groups_of(local).flat_map(of_group).collect()
     }
 
-    /// Returns the equations of the ties of a local block as functions.
-    fn ties_of(&self, local: usize) -> Vec<Vec<(usize, f64)>> {
+    /// Returns the equations of the terms of a local block as functions.
+    fn terms_of(&self, local: usize) -> Vec<Vec<(usize, f64)>> {
         let layout = &self.layout;
-        let of_tie = |&tie: &u32| {
-            let columns: Vec<usize> = layout.tie_columns(tie as usize).collect();
-            layout.equations_of_tie(tie as usize).map(move |row| self.row_of(row, &columns))
+        let of_term = |&term: &u32| {
+            let columns: Vec<usize> = layout.term_columns(term as usize).collect();
+            layout.equations_of_term(term as usize).map(move |row| self.row_of(row, &columns))
         };
-        layout.ties_of(local).iter().flat_map(of_tie).collect()
+        layout.terms_of(local).iter().flat_map(of_term).collect()
     }
 
     fn row_of(&self, row: usize, columns: &[usize]) -> Vec<(usize, f64)> {
@@ -108,9 +108,9 @@ impl Dense {
                 }
             }
         }
-        for tie in 0..layout.ties().len() {
-            for row in layout.equations_of_tie(tie) {
-                for column in layout.tie_columns(tie) {
+        for term in 0..layout.terms().len() {
+            for row in layout.equations_of_term(term) {
+                for column in layout.term_columns(term) {
                     matrix[(row, column)] = number();
                 }
             }
@@ -177,37 +177,37 @@ fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
             let further = further.prop_map(move |further| if common > 0 { further } else { BTreeSet::new() });
             let groups = prop::collection::vec(prop::collection::vec((main, further), 0..5), 1..25);
             let tied = prop::collection::btree_set(0..retained.len() as u32, 0..4);
-            let ties = prop::collection::vec((1..4usize, tied, any::<bool>()), 0..6);
+            let terms = prop::collection::vec((1..4usize, tied, any::<bool>()), 0..6);
             let of_locals = prop::collection::vec((1..4usize, any::<prop::sample::Index>()), 0..6);
             (
                 Just((l, rows, retained, shared)),
                 groups,
-                (ties, of_locals),
+                (terms, of_locals),
                 any::<u64>(),
                 prop::sample::select(ALL.to_vec()),
             )
         })
-        .prop_map(|((l, rows, mut retained, shared), locals, (ties, of_locals), seed, ordering)| {
+        .prop_map(|((l, rows, mut retained, shared), locals, (terms, of_locals), seed, ordering)| {
             let last = retained.len() as u32;
             retained.extend((shared > 0).then_some(shared));
             // Constraints and observations use an order different from the order of the blocks.
             let blocks = |own: BTreeSet<u32>, too: bool| -> Vec<u32> {
                 own.into_iter().rev().chain((shared > 0 && too).then_some(last)).collect()
             };
-            let tie = |(rows, own, too): (usize, BTreeSet<u32>, bool)| Tie {
+            let term = |(rows, own, too): (usize, BTreeSet<u32>, bool)| Term {
                 rows,
                 local: None,
                 retained: blocks(own, too),
             };
-            let of_local = |(rows, local): &(usize, prop::sample::Index)| Tie {
+            let of_local = |(rows, local): &(usize, prop::sample::Index)| Term {
                 rows: *rows,
                 local: Some(local.index(locals.len()) as u32),
                 retained: vec![],
             };
-            let of_locals: Vec<Tie> = of_locals.iter().map(of_local).collect();
-            let (first, last_ties) = of_locals.split_at(of_locals.len() / 2);
-            let ties = ties.into_iter().map(tie).filter(|tie| !tie.retained.is_empty());
-            let ties = first.iter().cloned().chain(ties).chain(last_ties.iter().cloned()).collect();
+            let of_locals: Vec<Term> = of_locals.iter().map(of_local).collect();
+            let (first, last_terms) = of_locals.split_at(of_locals.len() / 2);
+            let terms = terms.into_iter().map(term).filter(|term| !term.retained.is_empty());
+            let terms = first.iter().cloned().chain(terms).chain(last_terms.iter().cloned()).collect();
             let mut ptr = vec![0];
             for groups in &locals {
                 ptr.push(ptr[ptr.len() - 1] + groups.len());
@@ -221,7 +221,7 @@ fn systems() -> impl Strategy<Value = (Dense, Ordering)> {
             }
             let layout = Layout::new(rows, l, &retained, ptr, group_retained).unwrap();
             let layout = layout.with_shared(shared_ptr, all).unwrap();
-            (Dense::new(layout.with_ties(ties).unwrap(), seed), ordering)
+            (Dense::new(layout.with_terms(terms).unwrap(), seed), ordering)
         })
 }
 
@@ -350,8 +350,8 @@ fn compare_equation_blocks(dense: &Dense, system: &System, selected: &SelectedIn
     for local in (0..layout.locals()).step_by(layout.locals().div_ceil(20).max(1)) {
         let groups = layout.groups_of(local);
         let (first, count) = (groups.start * layout.rows(), groups.len() * layout.rows());
-        let (rows, ties) = (dense.rows_of(local), dense.ties_of(local));
-        let formed = [rows.clone(), ties].concat();
+        let (rows, terms) = (dense.rows_of(local), dense.terms_of(local));
+        let formed = [rows.clone(), terms].concat();
         let found = done(system.local_cofactors(selected, (&formed, &dense.prior.weight), &rows, local));
         assert_eq!(found.rows(), count);
         let group = |row: usize| row / layout.rows();
@@ -628,8 +628,8 @@ fn bits_do_not_depend_on_the_number_of_threads() {
 }
 
 fn same_bits(plain: Layout) {
-    let tie = |k: u32| Tie { rows: 2, local: None, retained: vec![k, k + 40, 7] };
-    same_bits_of(&Dense::new(plain.with_ties((10..30).map(tie).collect()).unwrap(), 3));
+    let term = |k: u32| Term { rows: 2, local: None, retained: vec![k, k + 40, 7] };
+    same_bits_of(&Dense::new(plain.with_terms((10..30).map(term).collect()).unwrap(), 3));
 }
 
 fn same_bits_of(dense: &Dense) {
@@ -683,8 +683,8 @@ impl Chains {
 impl Equations for Chains {
     fn write(&self, _: usize, _: usize, _: &mut GroupRows<'_>) {}
 
-    fn write_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
-        let weight = if tie.is_multiple_of(3) { 10.0 } else { 1.0 };
+    fn write_term(&self, term: usize, rows: &mut GroupRows<'_>) {
+        let weight = if term.is_multiple_of(3) { 10.0 } else { 1.0 };
         rows.constant[0] = 0.0;
         rows.shared.copy_from_slice(&[-weight, weight]);
     }
@@ -700,8 +700,8 @@ fn many_doubtful_pivots_are_told_from_lost_ones() {
     let chains = 2 * 700;
     let unknowns = chains * Chains::LENGTH;
     let ends = (0..unknowns as u32 - 1).filter(|k| !(*k as usize + 1).is_multiple_of(Chains::LENGTH));
-    let ties = ends.map(|k| Tie { rows: 1, local: None, retained: vec![k, k + 1] }).collect();
-    let layout = Layout::new(1, 1, &vec![1; unknowns], vec![0], vec![]).unwrap().with_ties(ties).unwrap();
+    let terms = ends.map(|k| Term { rows: 1, local: None, retained: vec![k, k + 1] }).collect();
+    let layout = Layout::new(1, 1, &vec![1; unknowns], vec![0], vec![]).unwrap().with_terms(terms).unwrap();
     let mut prior = Prior { weight: vec![0.0; unknowns], right: vec![0.0; unknowns], between: vec![] };
     prior.weight.iter_mut().step_by(2 * Chains::LENGTH).for_each(|weight| *weight = 1e-9);
     let chains_of = Chains(prior);
@@ -757,7 +757,7 @@ fn layouts_that_contradict_themselves_are_refused() {
         assert!(two.clone().with_shared(ptr, blocks).is_err());
     }
     let refused = |rows, retained: &[u32]| {
-        layout.clone().with_ties(vec![Tie { rows, local: None, retained: retained.to_vec() }]).is_err()
+        layout.clone().with_terms(vec![Term { rows, local: None, retained: retained.to_vec() }]).is_err()
     };
     assert!(refused(1, &[1]));
     assert!(refused(1, &[0, 0]));
@@ -765,7 +765,7 @@ fn layouts_that_contradict_themselves_are_refused() {
     assert!(refused(0, &[0]));
     assert!(!refused(1, &[0]));
     let of_local = |local, retained| {
-        layout.clone().with_ties(vec![Tie { rows: 1, local: Some(local), retained }]).is_err()
+        layout.clone().with_terms(vec![Term { rows: 1, local: Some(local), retained }]).is_err()
     };
     assert!(of_local(1, vec![]) && of_local(0, vec![0]) && !of_local(0, vec![]));
 }
@@ -842,10 +842,10 @@ fn blocks_outside_the_pattern_are_refused_unless_they_are_asked_for() {
 
 /// A network connected only by constraints, such as two points of equal height.
 #[test]
-fn ties_alone_are_a_system() {
+fn terms_alone_are_a_system() {
     let layout = Layout::new(1, 1, &[1; 6], vec![0], vec![]).unwrap();
-    let tie = |k: u32| Tie { rows: 1, local: None, retained: vec![k, (k + 1) % 6] };
-    let dense = Dense::new(layout.with_ties((0..6).map(tie).collect()).unwrap(), 9);
+    let term = |k: u32| Term { rows: 1, local: None, retained: vec![k, (k + 1) % 6] };
+    let dense = Dense::new(layout.with_terms((0..6).map(term).collect()).unwrap(), 9);
     for ordering in ALL {
         compare_with_dense(&dense, ordering);
     }

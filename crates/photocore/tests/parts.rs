@@ -9,7 +9,7 @@ use std::sync::Arc;
 use crate::cut::{Cut, TREES};
 use photocore::normals::{
     Chord, Contribution, Equations, Factor, FactorOptions, GroupRows, InvertOptions, Layout, LayoutError,
-    Ordering, Prior, ReducedRights, SolveOptions, System, Tie,
+    Ordering, Prior, ReducedRights, SolveOptions, System, Term,
 };
 use photocore::{Context, Threads};
 use proptest::prelude::*;
@@ -31,7 +31,7 @@ struct Piece<'a> {
     layout: Layout,
     locals: Vec<usize>,
     groups: Vec<usize>,
-    ties: Vec<usize>,
+    terms: Vec<usize>,
     retained: Vec<usize>,
     prior: Prior,
     below: Vec<Contribution<'a>>,
@@ -66,13 +66,13 @@ impl Equations for Piece<'_> {
         }
     }
 
-    fn write_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
-        let (layout, whole) = (&self.layout, self.ties[tie]);
-        let width = layout.tie_columns(tie).count();
+    fn write_term(&self, term: usize, rows: &mut GroupRows<'_>) {
+        let (layout, whole) = (&self.layout, self.terms[term]);
+        let width = layout.term_columns(term).count();
         for (k, constant) in rows.constant.iter_mut().enumerate() {
             let row = 100_000 + 8 * whole + k;
             *constant = number(self.seed, row, 7);
-            let retained = layout.ties()[tie].retained.iter().map(|&block| self.own(block as usize));
+            let retained = layout.terms()[term].retained.iter().map(|&block| self.own(block as usize));
             self.fill(row, &mut rows.shared[width * k..][..width], retained);
         }
     }
@@ -95,7 +95,7 @@ fn whole(layout: Layout, seed: u64) -> Piece<'static> {
         seed,
         locals: (0..layout.locals()).collect(),
         groups: (0..layout.groups()).collect(),
-        ties: (0..layout.ties().len()).collect(),
+        terms: (0..layout.terms().len()).collect(),
         retained: (0..layout.retained()).collect(),
         prior: Prior { weight, right, between: vec![] },
         below: vec![],
@@ -110,8 +110,8 @@ fn touched(layout: &Layout) -> Vec<Vec<usize>> {
             layout.groups_of(local).flat_map(|group| layout.blocks_of(group)).collect();
         blocks.into_iter().collect()
     };
-    let ties = layout.ties().iter().map(|tie| tie.retained.iter().map(|&block| block as usize).collect());
-    (0..layout.locals()).map(of_local).chain(ties).collect()
+    let terms = layout.terms().iter().map(|term| term.retained.iter().map(|&block| block as usize).collect());
+    (0..layout.locals()).map(of_local).chain(terms).collect()
 }
 
 /// Returns node `p` of a partitioned system.
@@ -121,8 +121,8 @@ fn piece<'a>(all: &Piece<'_>, cut: &Cut, p: usize) -> Piece<'a> {
     let place = |block: usize| retained.iter().position(|&own| own == block).unwrap() as u32;
     let homes = &cut.homes;
     let locals: Vec<usize> = (0..layout.locals()).filter(|&local| homes[local] == p).collect();
-    let ties: Vec<usize> =
-        (0..layout.ties().len()).filter(|&tie| homes[layout.locals() + tie] == p).collect();
+    let terms: Vec<usize> =
+        (0..layout.terms().len()).filter(|&term| homes[layout.locals() + term] == p).collect();
     let groups: Vec<usize> = locals.iter().flat_map(|&local| layout.groups_of(local)).collect();
     let (mut ptr, mut shared_ptr, mut further) = (vec![0], vec![0], vec![]);
     locals.iter().for_each(|&local| ptr.push(ptr[ptr.len() - 1] + layout.groups_of(local).len()));
@@ -132,15 +132,15 @@ fn piece<'a>(all: &Piece<'_>, cut: &Cut, p: usize) -> Piece<'a> {
     }
     let dims: Vec<usize> = retained.iter().map(|&block| layout.retained_dim(block)).collect();
     let main = groups.iter().map(|&group| place(layout.retained_of(group))).collect();
-    let tie = |&tie: &usize| {
-        let Tie { rows, retained, .. } = layout.ties()[tie].clone();
-        Tie { rows, local: None, retained: retained.iter().map(|&block| place(block as usize)).collect() }
+    let term = |&term: &usize| {
+        let Term { rows, retained, .. } = layout.terms()[term].clone();
+        Term { rows, local: None, retained: retained.iter().map(|&block| place(block as usize)).collect() }
     };
     let children = cut.children(p);
     let below = children.iter().map(|&child| cut.outer[child].iter().map(|&block| place(block)).collect());
     let own = Layout::new(layout.rows(), layout.local_dim(), &dims, ptr, main).unwrap();
     let own =
-        own.with_shared(shared_ptr, further).unwrap().with_ties(ties.iter().map(tie).collect()).unwrap();
+        own.with_shared(shared_ptr, further).unwrap().with_terms(terms.iter().map(term).collect()).unwrap();
     let outer = cut.outer[p].iter().map(|&block| place(block)).collect();
     let own = own.as_part(outer, below.collect()).unwrap();
     let unknowns = locals.iter().flat_map(|&local| layout.local_range(local));
@@ -153,7 +153,7 @@ fn piece<'a>(all: &Piece<'_>, cut: &Cut, p: usize) -> Piece<'a> {
     };
     let outer: Vec<usize> = own.unknowns_of(own.outer()).collect();
     outer.iter().for_each(|&unknown| (prior.weight[unknown], prior.right[unknown]) = (0.0, 0.0));
-    Piece { seed: all.seed, layout: own, locals, groups, ties, retained, prior, below: vec![] }
+    Piece { seed: all.seed, layout: own, locals, groups, terms, retained, prior, below: vec![] }
 }
 
 fn threads(count: usize) -> Threads {
@@ -365,8 +365,8 @@ fn compare(layout: Layout, tree: &[Option<usize>], node_of: Vec<usize>, seed: u6
         }
         let rows = own.rows();
         let of_groups = piece.groups.iter().flat_map(|&group| rows * group..rows * (group + 1));
-        let of_ties = piece.ties.iter().flat_map(|&tie| all.layout.equations_of_tie(tie));
-        for (share, row) in found.cofactors.equations.iter().zip(of_groups.chain(of_ties)) {
+        let of_terms = piece.terms.iter().flat_map(|&term| all.layout.equations_of_term(term));
+        for (share, row) in found.cofactors.equations.iter().zip(of_groups.chain(of_terms)) {
             assert_close(*share, cofactors.cofactors.equations[row], 1e-9, "adjusted equation");
         }
     }
@@ -385,21 +385,21 @@ fn systems() -> impl Strategy<Value = (Layout, u64)> {
         let tied = prop::collection::btree_set(0..retained.len() as u32, 1..4);
         (Just((l, retained)), groups, prop::collection::vec((1..4usize, tied), 0..6), any::<u64>())
     };
-    shape.prop_flat_map(of_shape).prop_map(|((l, retained), locals, ties, seed)| {
+    shape.prop_flat_map(of_shape).prop_map(|((l, retained), locals, terms, seed)| {
         let mut ptr = vec![0];
         locals.iter().for_each(|groups| ptr.push(ptr[ptr.len() - 1] + groups.len()));
         let (main, further): (Vec<u32>, Vec<BTreeSet<u32>>) = locals.into_iter().flatten().unzip();
         let mut shared_ptr = vec![0];
         further.iter().for_each(|own| shared_ptr.push(shared_ptr[shared_ptr.len() - 1] + own.len()));
         let further = further.into_iter().flatten().collect();
-        let tie = |(rows, retained): (usize, BTreeSet<u32>)| Tie {
+        let term = |(rows, retained): (usize, BTreeSet<u32>)| Term {
             rows,
             local: None,
             retained: retained.into_iter().collect(),
         };
         let layout =
             Layout::new(2, l, &retained, ptr, main).unwrap().with_shared(shared_ptr, further).unwrap();
-        (layout.with_ties(ties.into_iter().map(tie).collect()).unwrap(), seed)
+        (layout.with_terms(terms.into_iter().map(term).collect()).unwrap(), seed)
     })
 }
 

@@ -76,7 +76,7 @@ fn adjust_block(network: &Network, threads: &Threads) {
     covariances.cofactors(&[Of::Point(0), Of::Photo(0)], None, &mut Context::new(threads)).unwrap();
     network.adjustment(&options).from_state(&solution.state).run_in(&mut Context::new(threads)).unwrap();
     let mut trial = solution.converged.expect("it converges").trial(network);
-    trial.stand(&mut Context::new(threads)).unwrap();
+    trial.linearize(&mut Context::new(threads)).unwrap();
     trial.tests(true, threads).unwrap();
     trial.effects(&[0, 5], threads).unwrap();
     trial.responses(&[0, 5], threads).unwrap();

@@ -10,7 +10,7 @@ use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
 use crate::arrays::{Array, Indices, blocks, check_lengths, indices, rows, table};
-use crate::work::{Workers, watched};
+use crate::work::{Workers, supervised};
 
 create_exception!(
     _photocore,
@@ -71,8 +71,8 @@ pub fn adjust_comparator(
     let options =
         Options { method: Method::Damped(Stop::Fraction(limit)), max_iterations, ..Options::default() };
     let workers = Workers::of(0, calibration.measurements.len());
-    let solution = watched(py, workers, None, |context| calibration.adjust_on(&options, context))?;
-    told(py, solution.map_err(|error| failure(&error))?)
+    let solution = supervised(py, workers, None, |context| calibration.adjust_on(&options, context))?;
+    columns(py, solution.map_err(|error| failure(&error))?)
 }
 
 fn failure(error: &CalibrationError) -> PyErr {
@@ -104,7 +104,7 @@ pub struct ComparatorSolution {
     degrees_of_freedom: i64,
 }
 
-fn told(py: Python<'_>, found: Solution) -> PyResult<ComparatorSolution> {
+fn columns(py: Python<'_>, found: Solution) -> PyResult<ComparatorSolution> {
     let unknowns = found.comparator.len();
     let row = |case: &Placement| [case.rotation, case.translation[0], case.translation[1]];
     Ok(ComparatorSolution {

@@ -12,7 +12,7 @@ use pyo3::pybacked::PyBackedStr;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::memory;
-use crate::work::{Workers, watched};
+use crate::work::{Workers, supervised};
 
 /// Header of a file: texts, number of points, lengths of messages, radii, unknown fields.
 type HeaderRow<'py> = ([Option<String>; 6], Option<u64>, Vec<u64>, Vec<f64>, Bound<'py, PyBytes>);
@@ -54,7 +54,7 @@ pub fn control_points<'py>(
     file: &Bound<'py, PyAny>,
 ) -> PyResult<PointsRow<'py>> {
     let framing = lengths.as_deref().map_or(Framing::Lengths, Framing::Listed);
-    let read = watched(py, Workers::CALLER, None, |context| decoded(data, start..stop, framing, context))?;
+    let read = supervised(py, Workers::CALLER, None, |context| decoded(data, start..stop, framing, context))?;
     row(py, read.map_err(|fault| raised(&fault, file))?)
 }
 
@@ -64,7 +64,7 @@ pub fn control_points_of_text<'py>(
     data: &[u8],
     file: &Bound<'py, PyAny>,
 ) -> PyResult<(PointsRow<'py>, String)> {
-    let read = watched(py, Workers::CALLER, None, |context| read_text(data, context))?;
+    let read = supervised(py, Workers::CALLER, None, |context| read_text(data, context))?;
     let (points, around) = read.map_err(|fault| raised(&fault, file))?;
     Ok((row(py, points)?, around))
 }
@@ -78,7 +78,7 @@ pub fn control_point_messages<'py>(
 ) -> PyResult<Bound<'py, PyBytes>> {
     let (points, measures) = (Held::table(points, POINT)?, Held::table(measures, MEASURES)?);
     let all = all(&points, &measures, firsts.as_slice()?)?;
-    let written = watched(py, Workers::CALLER, None, |context| encoded(&all, context))?;
+    let written = supervised(py, Workers::CALLER, None, |context| encoded(&all, context))?;
     Ok(PyBytes::new(py, &written.map_err(|fault| raised(&fault, py.None().bind(py)))?))
 }
 
@@ -91,7 +91,7 @@ pub fn control_point_text<'py>(
 ) -> PyResult<Bound<'py, PyBytes>> {
     let (points, measures) = (Held::table(points, POINT)?, Held::table(measures, MEASURES)?);
     let all = all(&points, &measures, firsts.as_slice()?)?;
-    let written = watched(py, Workers::CALLER, None, |context| text(&all, context))?;
+    let written = supervised(py, Workers::CALLER, None, |context| text(&all, context))?;
     Ok(PyBytes::new(py, written.map_err(|fault| raised(&fault, py.None().bind(py)))?.as_bytes()))
 }
 

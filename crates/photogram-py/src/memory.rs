@@ -187,11 +187,11 @@ const CACHE: usize = 4 << 20;
 fn buffers() -> usize {
     static BYTES: OnceLock<usize> = OnceLock::new();
     *BYTES.get_or_init(|| {
-        let told = |name: &str| read_to_string(format!("/sys/devices/system/cpu/{name}")).ok();
+        let columns = |name: &str| read_to_string(format!("/sys/devices/system/cpu/{name}")).ok();
         let size =
-            told("cpu0/cache/index3/size").and_then(|size| size.trim().strip_suffix('K')?.parse().ok());
-        let last = told("present").and_then(|all| all.trim().rsplit(['-', ',']).next()?.parse().ok());
-        let sharing = told("cpu0/cache/index3/shared_cpu_map")
+            columns("cpu0/cache/index3/size").and_then(|size| size.trim().strip_suffix('K')?.parse().ok());
+        let last = columns("present").and_then(|all| all.trim().rsplit(['-', ',']).next()?.parse().ok());
+        let sharing = columns("cpu0/cache/index3/shared_cpu_map")
             .map_or(1, |map| map.chars().filter_map(|digit| digit.to_digit(16)).map(u32::count_ones).sum());
         let caches = (last.unwrap_or(0) + 1usize).div_ceil(sharing.max(1) as usize);
         2 * size.map_or(CACHE, |kibibytes: usize| 1024 * kibibytes).max(CACHE) * caches

@@ -13,7 +13,7 @@ use pyo3::prelude::*;
 use crate::adjustment::{IterationRow, iteration_row, status_name};
 use crate::arrays::{Array, blocks, check_lengths, numbers, rows, table};
 use crate::geometry::{object_space, rotation_sense};
-use crate::work::{Workers, watched};
+use crate::work::{Workers, supervised};
 
 create_exception!(_photocore, ResectionError, PyException, "The photo cannot be resected: (kind, message).");
 
@@ -74,8 +74,8 @@ pub fn resect(
 
 /// Adjusts on the calling thread: the work for one photo is too small for another thread.
 fn run(py: Python<'_>, resection: &Resection, options: &Options) -> PyResult<ResectionSolution> {
-    let solution = watched(py, Workers::CALLER, None, |context| resection.adjust_on(options, context))?;
-    told(py, &solution.map_err(|error| ResectionError::new_err((kind(error), error.to_string())))?)
+    let solution = supervised(py, Workers::CALLER, None, |context| resection.adjust_on(options, context))?;
+    columns(py, &solution.map_err(|error| ResectionError::new_err((kind(error), error.to_string())))?)
 }
 
 fn pose(name: &str, array: &Array<'_>) -> PyResult<[[f64; 3]; 2]> {
@@ -130,7 +130,7 @@ pub struct ResectionSolution {
     outside_danger_cylinder: Option<f64>,
 }
 
-fn told(py: Python<'_>, found: &Solution) -> PyResult<ResectionSolution> {
+fn columns(py: Python<'_>, found: &Solution) -> PyResult<ResectionSolution> {
     let of_images = |part: fn(&AdjustedImage) -> [f64; 2]| {
         table(py, found.images.iter().map(part).collect()).map(Bound::unbind)
     };

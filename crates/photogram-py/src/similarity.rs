@@ -14,7 +14,7 @@ use crate::adjustment::{IterationRow, iteration_row, status_name};
 use crate::arrays::{
     Array, Blocks, Matrix, Vector, blocks, check_lengths, from_rows, row_major, rows, table,
 };
-use crate::work::{Workers, watched};
+use crate::work::{Workers, supervised};
 
 create_exception!(
     _photocore,
@@ -105,8 +105,8 @@ fn run(
     threads: usize,
 ) -> PyResult<SimilaritySolution> {
     let workers = Workers::of(threads, stations.len());
-    let solution = watched(py, workers, None, |context| orient_on(stations, options, context))?;
-    told(py, solution.map_err(|error| failure(&error))?)
+    let solution = supervised(py, workers, None, |context| orient_on(stations, options, context))?;
+    columns(py, solution.map_err(|error| failure(&error))?)
 }
 
 fn failure(error: &Failure) -> PyErr {
@@ -155,7 +155,7 @@ pub struct SimilaritySolution {
     standardized: Py<PyArray2<f64>>,
 }
 
-fn told(py: Python<'_>, found: Solution) -> PyResult<SimilaritySolution> {
+fn columns(py: Python<'_>, found: Solution) -> PyResult<SimilaritySolution> {
     let parameter_unknowns = |part: fn(&AdjustedStation) -> [f64; 3]| {
         table(py, found.stations.iter().map(part).collect()).map(Bound::unbind)
     };

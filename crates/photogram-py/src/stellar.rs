@@ -21,7 +21,7 @@ use crate::arrays::{
     Array, Indices, Matrix, Vector, blocks, check_lengths, from_rows, group_rows, indices, matrices, numbers,
     row_major, rows, table,
 };
-use crate::work::{Workers, watched};
+use crate::work::{Workers, supervised};
 
 create_exception!(
     _photocore,
@@ -289,7 +289,7 @@ impl StellarProblem {
             whole,
         };
         let work = |context: &mut Context<'_>| self.calibration.adjust_on(&options, context);
-        let solution = watched(py, Workers::of(threads, self.calibration.images.len()), progress, work)?
+        let solution = supervised(py, Workers::of(threads, self.calibration.images.len()), progress, work)?
             .map_err(|error| failure(&error))?;
         let found = observations(py, solution.observations)?;
         found.set_item("status", status_name(solution.adjustment.status))?;
@@ -314,8 +314,9 @@ impl StellarProblem {
     }
 
     fn without_effect(&self, py: Python<'_>) -> PyResult<Vec<usize>> {
-        let found =
-            watched(py, Workers::of(0, 0), None, |context| self.calibration.without_effect(context.threads))?;
+        let found = supervised(py, Workers::of(0, 0), None, |context| {
+            self.calibration.without_effect(context.threads)
+        })?;
         found.map_err(|error| failure(&error))
     }
 
@@ -328,7 +329,7 @@ impl StellarProblem {
         passes: usize,
     ) -> PyResult<Bound<'py, PyDict>> {
         let tolerances = Tolerances { refraction, distortion, passes };
-        let correction = watched(py, Workers::of(0, 0), None, |context| {
+        let correction = supervised(py, Workers::of(0, 0), None, |context| {
             self.calibration.correction(&tolerances, context.threads)
         })?;
         let correction = correction.map_err(|error| failure(&error))?;

@@ -13,7 +13,7 @@ use pyo3::pybacked::PyBackedStr;
 use pyo3::types::PyBytes;
 use rayon::prelude::*;
 
-use crate::work::{Workers, watched};
+use crate::work::{Workers, supervised};
 
 #[pyfunction]
 pub fn read_numbers<'py>(py: Python<'py>, text: &[u8]) -> (Vector<'py>, bool) {
@@ -45,7 +45,7 @@ impl TableReader {
 
     fn add(&mut self, py: Python<'_>, lines: &[u8]) -> PyResult<bool> {
         let mut table = self.table.take();
-        let Ok(table) = watched(py, Workers::reading(lines.len() / LINE), None, |context| {
+        let Ok(table) = supervised(py, Workers::reading(lines.len() / LINE), None, |context| {
             let regular =
                 context.threads.install(|| table.as_mut().and_then(|table| table.add(lines))).is_some();
             Ok::<_, Infallible>(table.filter(|_| regular))
@@ -148,7 +148,7 @@ pub fn csv_rows<'py>(py: Python<'py>, columns: Vec<Column>) -> PyResult<Bound<'p
         own
     };
     let firsts: Vec<usize> = (0..rows).step_by(STRETCH).collect();
-    let Ok(parts) = watched(py, Workers::reading(rows), None, |context| {
+    let Ok(parts) = supervised(py, Workers::reading(rows), None, |context| {
         let parts = context.threads.install(|| firsts.par_iter().map(|&first| stretch(first)).collect());
         Ok::<Vec<Vec<u8>>, Infallible>(parts)
     })?;

@@ -62,7 +62,7 @@ impl Workers {
 ///
 /// # Errors
 /// An exception of a signal or of `progress`; insufficient memory or threads.
-pub fn watched<T: Send, E: Send>(
+pub fn supervised<T: Send, E: Send>(
     py: Python<'_>,
     workers: Workers,
     progress: Option<Py<PyAny>>,

@@ -171,7 +171,7 @@ impl<'a> Run<'a, '_> {
         (values, evaluated)
     }
 
-    /// Returns the second-order term a of a step, and a^T (N + damping) a. The few ties are regarded as linear.
+    /// Returns the second-order term a of a step, and a^T (N + damping) a. The few terms are regarded as linear.
     fn second_order(&mut self, state: &Iterate<'a>, step: &[f64]) -> Result<(Vec<f64>, f64), AdjustError> {
         let part: Vec<f64> = step.iter().map(|value| PART * value).collect();
         let ahead =

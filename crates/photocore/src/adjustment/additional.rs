@@ -130,9 +130,9 @@ impl LocalRows {
         all.push(of);
         scratch.clear();
         to.parameters.partials(&Equation { of, sd, row }, shared, scratch);
-        // All rows of a tie, whose components are whitened together, depend on the same parameters.
-        let is_tie = matches!(of, EquationOf::Tie { .. });
-        partials.extend(scratch.iter().filter(|partial| is_tie || partial.1 != 0.0));
+        // All rows of a term, whose components are whitened together, depend on the same parameters.
+        let is_term = matches!(of, EquationOf::Term { .. });
+        partials.extend(scratch.iter().filter(|partial| is_term || partial.1 != 0.0));
         let start = own.len();
         own.resize(start + *width, 0.0);
         row.entries().filter(|own| !to.fixed[own.0]).for_each(|(unknown, value)| {
@@ -168,14 +168,14 @@ impl<'a> Extended<'a> {
         Self { equations: equations.with_fixed_columns(), fixed, parameters }
     }
 
-    /// Writes the equations of a local block: its groups, its ties and its unknowns as observations.
+    /// Writes the equations of a local block: its groups, its terms and its unknowns as observations.
     pub fn write(&self, buffers: &mut Buffers, local: usize, rows: &mut LocalRows) {
         let range = self.equations.problem().layout().local_range(local);
         rows.clear(range.len());
         self.equations.each_row_of_local(buffers, local, |row| rows.push(self, row, range.start));
     }
 
-    /// Calls `add` with each equation of retained blocks, as a block without unknowns of its own: ties, then unknowns as observations.
+    /// Calls `add` with each equation of retained blocks, as a block without unknowns of its own: terms, then unknowns as observations.
     pub fn each_retained(&self, mut add: impl FnMut(&LocalRows)) {
         let first = self.equations.problem().layout().all_locals().end;
         let mut rows = LocalRows::default();
@@ -497,7 +497,7 @@ const SOLVED: usize = 32;
 /// Parts whose sums are separate, for any number of threads: the sums are the same, bit by bit.
 pub(super) const PARTS: usize = 64;
 
-/// The sums over ties of retained blocks and over unknowns that are not local.
+/// The sums over terms of retained blocks and over unknowns that are not local.
 fn retained(extended: &Extended<'_>, count: usize) -> Sums {
     let layout = extended.equations.problem().layout();
     let (mut sums, mut work) = (Sums::new(layout, count), Work::default());

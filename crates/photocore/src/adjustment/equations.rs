@@ -9,8 +9,8 @@ use nalgebra::DMatrix;
 use smallvec::SmallVec;
 
 use super::loss::Reweighting;
+use super::prior_terms::{PriorTerm, PriorTerms, is_weighted};
 use super::problem::{AnyProblem, Evaluated};
-use super::terms::{Term, Terms, is_weighted};
 use super::walk::Buffers;
 use crate::normals::{Contribution, Equations, GroupRows, Prior};
 use crate::{Threads, parallel};
@@ -23,7 +23,7 @@ const PARTS: usize = 16;
 pub struct ObservationEquations<'a> {
     problem: &'a AnyProblem<'a>,
     at: Box<dyn Evaluated + 'a>,
-    terms: Terms,
+    prior_terms: PriorTerms,
     /// Normal equations of the terms.
     prior: OnceLock<Prior>,
     /// Standard deviations of the observations; infinite for excluded ones.
@@ -47,11 +47,11 @@ pub enum EquationOf {
         /// The row in the group.
         row: usize,
     },
-    /// A row of a tie.
-    Tie {
-        /// The tie.
-        tie: usize,
-        /// The row in the tie.
+    /// A row of a term.
+    Term {
+        /// The term.
+        term: usize,
+        /// The row in the term.
         row: usize,
     },
     /// An unknown as an observation of itself.
@@ -64,7 +64,7 @@ pub enum EquationOf {
 pub struct Row<'a> {
     /// Its observation.
     pub of: EquationOf,
-    /// Its index, in the order of groups and rows, then of ties and rows, then of unknowns.
+    /// Its index, in the order of groups and rows, then of terms and rows, then of unknowns.
     pub number: usize,
     /// Observed minus computed.
     pub constant: f64,
@@ -115,11 +115,11 @@ impl<'a> ObservationEquations<'a> {
         reweighting: Option<Reweighting>,
     ) -> Self {
         let fixed = Some(problem.fixed(held)).filter(|fixed| fixed.contains(&true));
-        let (terms, observation_sd) = (problem.terms(values), &problem.observation_sd[..]);
+        let (prior_terms, observation_sd) = (problem.prior_terms(values), &problem.observation_sd[..]);
         Self {
             problem,
             at,
-            terms,
+            prior_terms,
             prior: OnceLock::new(),
             observation_sd,
             fixed,
@@ -157,8 +157,8 @@ impl<'a> ObservationEquations<'a> {
     }
 
     /// Returns the prior terms.
-    pub fn terms(&self) -> &Terms {
-        &self.terms
+    pub fn prior_terms(&self) -> &PriorTerms {
+        &self.prior_terms
     }
 
     /// Standard deviation of the observation of an equation.
@@ -193,22 +193,22 @@ impl<'a> ObservationEquations<'a> {
         }
     }
 
-    /// Calls `take` with the rows of a tie.
+    /// Calls `take` with the rows of a term.
     #[inline(always)]
-    pub fn each_row_of_tie(&self, buffers: &mut Buffers, tie: usize, mut take: impl FnMut(&Row<'_>)) {
+    pub fn each_row_of_term(&self, buffers: &mut Buffers, term: usize, mut take: impl FnMut(&Row<'_>)) {
         let (layout, Buffers { rows, columns }) = (self.problem.layout(), buffers);
         columns.clear();
-        columns.extend(layout.tie_columns(tie));
-        let mut rows = rows.tie(layout, tie);
-        self.write_tie(tie, &mut rows);
-        let of = |row| EquationOf::Tie { tie, row };
-        rows.each(columns, layout.equations_of_tie(tie).start, of, &mut take);
+        columns.extend(layout.term_columns(term));
+        let mut rows = rows.term(layout, term);
+        self.write_term(term, &mut rows);
+        let of = |row| EquationOf::Term { term, row };
+        rows.each(columns, layout.equations_of_term(term).start, of, &mut take);
     }
 
     /// Calls `take` with the row of each weighted unknown of a range, as an observation of itself.
     pub fn each_prior(&self, buffers: &mut Buffers, of: Range<usize>, mut take: impl FnMut(&Row<'_>)) {
         let Buffers { rows, columns } = buffers;
-        for term in self.terms.within(of) {
+        for term in self.prior_terms.within(of) {
             columns.clear();
             columns.extend(term.unknowns());
             let rows = rows.rows(columns.len(), [0, 0, columns.len()]);
@@ -226,27 +226,29 @@ impl<'a> ObservationEquations<'a> {
         }
     }
 
-    /// Calls `take` with all rows of a local block: of groups, ties and weighted unknowns.
+    /// Calls `take` with all rows of a local block: of groups, terms and weighted unknowns.
     pub fn each_row_of_local(&self, buffers: &mut Buffers, local: usize, mut take: impl FnMut(&Row<'_>)) {
         let layout = self.problem.layout();
         self.each_row(buffers, local, &mut take);
-        for &tie in layout.ties_of(local) {
-            self.each_row_of_tie(buffers, tie as usize, &mut take);
+        for &term in layout.terms_of(local) {
+            self.each_row_of_term(buffers, term as usize, &mut take);
         }
         self.each_prior(buffers, layout.local_range(local), take);
     }
 
-    /// Calls `take` with the rows of ties and weighted unknowns, except for those of local blocks if `retained`.
+    /// Calls `take` with the rows of terms and weighted unknowns, except for those of local blocks if `retained`.
     pub fn each_other_row(&self, retained: bool, mut take: impl FnMut(&Row<'_>)) {
         let (layout, mut buffers) = (self.problem.layout(), Buffers::default());
-        for tie in (0..layout.ties().len()).filter(|&tie| !retained || layout.ties()[tie].local.is_none()) {
-            self.each_row_of_tie(&mut buffers, tie, &mut take);
+        for term in
+            (0..layout.terms().len()).filter(|&term| !retained || layout.terms()[term].local.is_none())
+        {
+            self.each_row_of_term(&mut buffers, term, &mut take);
         }
         let first = if retained { layout.all_locals().end } else { 0 };
         self.each_prior(&mut buffers, first..layout.unknowns(), take);
     }
 
-    /// Sums over the rows of groups and of ties, in parts of consecutive rows that depend on the layout only.
+    /// Sums over the rows of groups and of terms, in parts of consecutive rows that depend on the layout only.
     pub fn fold_rows<T: Send>(
         &self,
         threads: &Threads,
@@ -258,9 +260,9 @@ impl<'a> ObservationEquations<'a> {
             locals.for_each(|local| self.each_row(buffers, local, |row| add(&mut sum, row)));
             sum
         });
-        parts.extend(self.problem.for_ties(threads, |buffers, ties| {
+        parts.extend(self.problem.for_terms(threads, |buffers, terms| {
             let mut sum = start();
-            ties.for_each(|tie| self.each_row_of_tie(buffers, tie, |row| add(&mut sum, row)));
+            terms.for_each(|term| self.each_row_of_term(buffers, term, |row| add(&mut sum, row)));
             sum
         }));
         parts
@@ -375,8 +377,8 @@ impl<'a> ObservationEquations<'a> {
         let is_fixed = |unknown: usize| self.fixed.as_ref().is_some_and(|fixed| fixed[unknown]);
         let weight = (0..layout.unknowns()).map(|i| f64::from(u8::from(is_fixed(i)))).collect();
         let mut prior = Prior { weight, right: vec![0.0; layout.unknowns()], between: vec![] };
-        for term in self.terms.within(0..layout.unknowns()) {
-            add_term(&mut prior, &term, is_fixed);
+        for term in self.prior_terms.within(0..layout.unknowns()) {
+            add_prior_term(&mut prior, &term, is_fixed);
         }
         layout.unknowns_of(layout.outer()).for_each(|unknown| prior.weight[unknown] = 0.0);
         prior
@@ -384,7 +386,7 @@ impl<'a> ObservationEquations<'a> {
 }
 
 /// Adds A^T A and A^T l of a term, except for fixed unknowns.
-fn add_term(prior: &mut Prior, term: &Term<'_>, is_fixed: impl Fn(usize) -> bool) {
+fn add_prior_term(prior: &mut Prior, term: &PriorTerm<'_>, is_fixed: impl Fn(usize) -> bool) {
     for (i, unknown) in term.unknowns().enumerate().filter(|&(_, unknown)| !is_fixed(unknown)) {
         let product = |j: usize| term.rows().map(|row| row[i] * row[j]).sum::<f64>();
         prior.weight[unknown] = product(i);
@@ -418,16 +420,16 @@ impl Equations for ObservationEquations<'_> {
         }
     }
 
-    fn write_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
+    fn write_term(&self, term: usize, rows: &mut GroupRows<'_>) {
         let layout = self.problem.layout();
-        self.at.observe_tie(tie, rows);
-        rows.weigh(&self.observation_sd[layout.equations_of_tie(tie)]);
+        self.at.observe_term(term, rows);
+        rows.weigh(&self.observation_sd[layout.equations_of_term(term)]);
         self.reweigh(rows);
         if let Some(fixed) = &self.fixed {
             zero_columns(
-                rows.of_tie(),
-                layout.ties()[tie].rows,
-                layout.tie_columns(tie).map(|unknown| fixed[unknown]),
+                rows.of_term(),
+                layout.terms()[term].rows,
+                layout.term_columns(term).map(|unknown| fixed[unknown]),
             );
         }
     }

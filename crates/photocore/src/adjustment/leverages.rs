@@ -129,14 +129,14 @@ impl Leverages {
         let same = included.is_some() || std::ptr::eq(observation_sd, &problem.observation_sd[..]);
         let others = (!same).then(|| self.equations(problem, threads));
         let of = |&local: &usize| {
-            let (of_groups, of_ties) = rows_of_local(&asked, local);
+            let (of_groups, of_terms) = rows_of_local(&asked, local);
             let mut rows = of_groups.clone();
             rows.extend(terms(local));
-            let (mut formed, ties) = match &others {
+            let (mut formed, terms) = match &others {
                 Some(included) => rows_of_local(included, local),
-                None => (of_groups, of_ties),
+                None => (of_groups, of_terms),
             };
-            formed.extend(ties);
+            formed.extend(terms);
             problem.system.local_cofactors(&self.selected, (&formed, &weight), &rows, local)
         };
         let found = threads.install(|| parallel::map(locals.len(), 1, |k| of(&locals[k])));
@@ -187,25 +187,25 @@ impl Leverages {
         Ok(())
     }
 
-    /// Returns the equations of some ties as functions of the unknowns, for given standard deviations.
-    pub fn rows_of_ties(
+    /// Returns the equations of some terms as functions of the unknowns, for given standard deviations.
+    pub fn rows_of_terms(
         &self,
         problem: &AnyProblem<'_>,
         observation_sd: &[f64],
-        ties: &[usize],
+        terms: &[usize],
         threads: &Threads,
     ) -> Vec<Vec<Function>> {
-        if ties.is_empty() {
+        if terms.is_empty() {
             return vec![];
         }
         let asked = self.equations(problem, threads).with_deviations(observation_sd);
         let mut buffers = Buffers::default();
-        let mut of_tie = |&tie: &usize| {
+        let mut of_term = |&term: &usize| {
             let mut rows = vec![];
-            asked.each_row_of_tie(&mut buffers, tie, |row| rows.push(row.entries().collect()));
+            asked.each_row_of_term(&mut buffers, term, |row| rows.push(row.entries().collect()));
             rows
         };
-        ties.iter().map(&mut of_tie).collect()
+        terms.iter().map(&mut of_term).collect()
     }
 
     /// Returns the cofactors of functions of one local block, or of retained blocks, which need no equations: the selected inverse contains
@@ -263,14 +263,14 @@ impl Leverages {
     }
 }
 
-/// Returns the equations of the groups and of the ties of a local block.
+/// Returns the equations of the groups and of the terms of a local block.
 fn rows_of_local(equations: &ObservationEquations<'_>, local: usize) -> (Vec<Function>, Vec<Function>) {
-    let (mut of_groups, mut of_ties, mut buffers) = (vec![], vec![], Buffers::default());
+    let (mut of_groups, mut of_terms, mut buffers) = (vec![], vec![], Buffers::default());
     equations.each_row(&mut buffers, local, |row| of_groups.push(row.entries().collect()));
-    for &tie in equations.problem().layout().ties_of(local) {
-        equations.each_row_of_tie(&mut buffers, tie as usize, |row| of_ties.push(row.entries().collect()));
+    for &term in equations.problem().layout().terms_of(local) {
+        equations.each_row_of_term(&mut buffers, term as usize, |row| of_terms.push(row.entries().collect()));
     }
-    (of_groups, of_ties)
+    (of_groups, of_terms)
 }
 
 /// Returns the rows of groups of a fixed local block whose residuals may have correlations above a limit.

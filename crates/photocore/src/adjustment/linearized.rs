@@ -103,7 +103,7 @@ impl Linearized {
     ) -> Result<Self, AdjustError> {
         let (start, problem) = (Instant::now(), equations.problem());
         let factor = problem.system.factor(equations, options, context)?;
-        let sum_of_squares = factor.sum_of_squares + equations.terms().sum_of_squares(0..values.len());
+        let sum_of_squares = factor.sum_of_squares + equations.prior_terms().sum_of_squares(0..values.len());
         let (took, share) = (start.elapsed().as_secs_f64(), factor.formation_share);
         let seconds =
             PhaseTimes { form: took * share, factor: took * (1.0 - share), ..PhaseTimes::default() };
@@ -327,7 +327,7 @@ impl Linearized {
         let Self { values, held, factor, transformation, mut seconds, .. } = self;
         let found = factor.invert(equations, options, context);
         let Inversion { mut cofactors, selected, inversion_share } = found?;
-        let prior_redundancy = problem.finish_cofactors(&mut cofactors, &held, equations.terms());
+        let prior_redundancy = problem.finish_cofactors(&mut cofactors, &held, equations.prior_terms());
         let lost = transformation.map(|transformation| {
             context.threads.install(|| transformation.apply(problem.layout(), &mut cofactors))
         });

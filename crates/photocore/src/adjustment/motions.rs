@@ -120,13 +120,13 @@ impl<'a> Candidates<'a> {
         self.add_to_row(sums, row);
     }
 
-    /// Adds a row of a tie or prior, with corrections for the transformation of its misclosure (see [`Evaluated::carried`]).
+    /// Adds a row of a term or prior, with corrections for the transformation of its misclosure (see [`Evaluated::carried`]).
     pub fn add_other_row(&self, sums: &mut Sums, equations: &ObservationEquations<'_>, row: &Row<'_>) {
         sums.along.fill([0.0; LANES]);
         let sd = equations.deviation(row.number);
-        if let EquationOf::Tie { tie, row } = row.of
+        if let EquationOf::Term { term, row } = row.of
             && sd.is_finite()
-            && let Some((motion, carried)) = equations.at().carried(tie)
+            && let Some((motion, carried)) = equations.at().carried(term)
         {
             let along = sums.along.as_flattened_mut()[motion..].iter_mut();
             along.zip(&carried[row]).for_each(|(along, by)| *along = by / sd);
@@ -296,8 +296,8 @@ fn to_hold(
 pub struct Classes<'a> {
     /// Number of types.
     pub count: usize,
-    /// Type of each tie.
-    pub of_ties: &'a [usize],
+    /// Type of each term.
+    pub of_terms: &'a [usize],
     /// Type of each unknown, as an observation of itself.
     pub of_unknowns: &'a [usize],
 }
@@ -322,8 +322,8 @@ impl AnyProblem<'_> {
         }
         let mut observed: Vec<bool> = self.sd.iter().map(|&sd| sd == 0.0).collect();
         equations.each_other_row(false, |row| match row.of {
-            EquationOf::Tie { tie, .. } => {
-                candidates.add_other_row(&mut sums[classes.of_ties[tie]], &equations, row);
+            EquationOf::Term { term, .. } => {
+                candidates.add_other_row(&mut sums[classes.of_terms[term]], &equations, row);
             }
             _ => row.entries().for_each(|(unknown, _)| observed[unknown] = true),
         });

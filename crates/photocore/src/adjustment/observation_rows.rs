@@ -5,7 +5,7 @@ use super::problem::AnyProblem;
 use super::walk::Buffers;
 use crate::{Threads, parallel};
 
-/// Equations a x = l of unit weight: groups and rows first, then ties and rows, then one equation per unknown as an observation of itself,
+/// Equations a x = l of unit weight: groups and rows first, then terms and rows, then one equation per unknown as an observation of itself,
 /// empty unless weighted.
 #[derive(Debug)]
 pub struct ObservationRows {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::terms::{Terms, is_weighted};
+use super::prior_terms::{PriorTerms, is_weighted};
 use crate::normals::{GroupRows, Layout, LayoutError, System};
 
 /// Functional model: computes observations from unknowns.
@@ -24,8 +24,8 @@ pub trait Model: Sync {
 
     /// Returns the prior terms of correlated unknowns, or of unknowns with a special [`Model::advance`], at the given values. `prior` and
     /// `sd` are the arrays of the problem. All other weighted unknowns have terms of one unknown.
-    fn terms(&self, _values: &[f64], _prior: &[f64], _sd: &[f64]) -> Terms {
-        Terms::default()
+    fn prior_terms(&self, _values: &[f64], _prior: &[f64], _sd: &[f64]) -> PriorTerms {
+        PriorTerms::default()
     }
 
     /// Recomputes the local unknowns from the others; returns false if the model does not support it. Far from the solution this often
@@ -105,8 +105,8 @@ pub trait Evaluated: Send + Sync {
         false
     }
 
-    /// Writes misclosures and partials of a tie (see [`GroupRows::of_tie`]). Only called if the layout has ties.
-    fn observe_tie(&self, _tie: usize, _rows: &mut GroupRows<'_>) {}
+    /// Writes misclosures and partials of a term (see [`GroupRows::of_term`]). Only called if the layout has terms.
+    fn observe_term(&self, _term: usize, _rows: &mut GroupRows<'_>) {}
 
     /// Returns ill-conditioned local blocks, and blocks that approach this state. Their information on one retained block exceeds all other
     /// information so far that rounding destroys the latter. Called after every damped step, with the unknowns before it.
@@ -120,10 +120,10 @@ pub trait Evaluated: Send + Sync {
         vec![]
     }
 
-    /// Returns the effect of motions on the misclosures of a tie, in unit weight, if the tie observes a displacement of the moving space.
+    /// Returns the effect of motions on the misclosures of a term, in unit weight, if the term observes a displacement of the moving space.
     /// The result is the number of the first motion with an effect, and one row per equation. Rotation and scale change the displacement,
     /// but not the sum of squares for isotropic weights. For other weights they do not determine the motion.
-    fn carried(&self, _tie: usize) -> Option<(usize, Vec<[f64; 7]>)> {
+    fn carried(&self, _term: usize) -> Option<(usize, Vec<[f64; 7]>)> {
         None
     }
 }
@@ -143,7 +143,7 @@ pub struct Motions {
 pub struct Problem<M: ?Sized> {
     /// The ordered layout.
     pub system: Arc<System>,
-    /// Standard deviation of each observation, in the order of groups and rows, then of ties and rows; infinite for an excluded one.
+    /// Standard deviation of each observation, in the order of groups and rows, then of terms and rows; infinite for an excluded one.
     pub observation_sd: Vec<f64>,
     /// Initial value of each unknown.
     pub initial: Vec<f64>,
@@ -164,7 +164,7 @@ impl<M: ?Sized> Problem<M> {
         self.system.layout()
     }
 
-    /// Number of equations: rows of groups and of ties, then one per unknown as an observation of itself, which is empty unless weighted.
+    /// Number of equations: rows of groups and of terms, then one per unknown as an observation of itself, which is empty unless weighted.
     pub fn equations(&self) -> usize {
         self.observation_sd.len() + self.sd.len()
     }
@@ -191,8 +191,8 @@ impl<M: Model> Problem<M> {
 
 impl AnyProblem<'_> {
     /// Returns the prior terms at given values.
-    pub fn terms(&self, values: &[f64]) -> Terms {
-        Terms::new(self.model.terms(values, &self.prior, &self.sd), values, &self.prior, &self.sd)
+    pub fn prior_terms(&self, values: &[f64]) -> PriorTerms {
+        PriorTerms::new(self.model.prior_terms(values, &self.prior, &self.sd), values, &self.prior, &self.sd)
     }
 
     /// Returns an error unless all arrays and `values` have the lengths of the layout.

@@ -65,9 +65,9 @@ pub struct Adjustment {
     pub last_corrections: Vec<f64>,
     /// Adjusted unknowns, in the order of the layout.
     pub unknowns: Vec<f64>,
-    /// Observed minus computed, in the order of groups and rows, then of ties and rows, in the units of the observations.
+    /// Observed minus computed, in the order of groups and rows, then of terms and rows, in the units of the observations.
     pub residuals: Vec<f64>,
-    /// Weight factor from the loss for each group of observations, then for each tie; None without a loss.
+    /// Weight factor from the loss for each group of observations, then for each term; None without a loss.
     pub weights: Option<Vec<f64>>,
     /// Cofactors (a priori unit weight, weights modified by the loss), if requested; None if the final values leave unknowns undetermined.
     pub cofactors: Option<Cofactors>,

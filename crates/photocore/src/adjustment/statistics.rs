@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 
 use super::loss::Loss;
+use super::prior_terms::{PriorTerms, weighted_among};
 use super::problem::{AnyProblem, Evaluated, Problem};
-use super::terms::{Terms, weighted_among};
 use crate::Threads;
 use crate::normals::{Cofactors, dot};
 
@@ -77,26 +77,26 @@ impl<M: ?Sized> Problem<M> {
 }
 
 impl AnyProblem<'_> {
-    /// Returns the objective at values with the given residuals: the weighted sum of squares, with a loss for groups and ties.
+    /// Returns the objective at values with the given residuals: the weighted sum of squares, with a loss for groups and terms.
     pub fn objective(&self, values: &[f64], residuals: &[f64], loss: Option<Loss>) -> f64 {
         let observed: f64 = match loss {
             None => self.sum_of_squares(residuals),
             Some(loss) => self.group_squares(residuals).map(|square| loss.value(square)).sum(),
         };
-        observed + self.terms(values).sum_of_squares(0..values.len())
+        observed + self.prior_terms(values).sum_of_squares(0..values.len())
     }
 
     /// Returns the redundancy number of each unknown as an observation of itself, 1 - a Q a^T for its equation a; zero unless weighted.
-    /// Cofactors of fixed and constrained unknowns, which have unit weight in the normal equations, are set to zero. `terms` are those
+    /// Cofactors of fixed and constrained unknowns, which have unit weight in the normal equations, are set to zero. `prior_terms` are those
     /// of the linearization point.
     pub(super) fn finish_cofactors(
         &self,
         cofactors: &mut Cofactors,
         held: &[usize],
-        terms: &Terms,
+        prior_terms: &PriorTerms,
     ) -> Vec<f64> {
         let (mut redundancy, fixed) = (vec![0.0; self.sd.len()], self.fixed(held));
-        let mut terms = terms.within(0..self.sd.len()).peekable();
+        let mut prior_terms = prior_terms.within(0..self.sd.len()).peekable();
         let mut finish = |block: &mut [f64], unknowns: Range<usize>| {
             let width = unknowns.len();
             for (d, unknown) in unknowns.clone().enumerate() {
@@ -104,7 +104,7 @@ impl AnyProblem<'_> {
                     block[d * (width + 1)] = 0.0;
                 }
             }
-            while let Some(term) = terms.next_if(|term| term.first < unknowns.end) {
+            while let Some(term) = prior_terms.next_if(|term| term.first < unknowns.end) {
                 let first = (term.first - unknowns.start) * (width + 1);
                 for (row, unknown) in term.rows().zip(term.unknowns()).filter(|&(_, i)| self.is_weighted(i)) {
                     let along = |i: usize| dot(row, &block[first + i * width..][..row.len()]);
@@ -151,17 +151,17 @@ impl AnyProblem<'_> {
             }
             residuals
         });
-        let by_tie = self.for_ties(threads, |buffers, ties| {
+        let by_term = self.for_terms(threads, |buffers, terms| {
             let mut residuals = vec![];
-            for tie in ties {
-                let mut rows = buffers.rows.tie(layout, tie);
-                at.observe_tie(tie, &mut rows);
+            for term in terms {
+                let mut rows = buffers.rows.term(layout, term);
+                at.observe_term(term, &mut rows);
                 residuals.extend_from_slice(rows.constant);
             }
             residuals
         });
         let mut residuals = by_stretch.concat();
-        residuals.extend(by_tie.concat());
+        residuals.extend(by_term.concat());
         residuals
     }
 }
@@ -172,13 +172,13 @@ impl<M: ?Sized> Problem<M> {
         residuals.iter().zip(&self.observation_sd).map(square).sum()
     }
 
-    /// Returns the weighted sum of squares for each group, then for each tie.
+    /// Returns the weighted sum of squares for each group, then for each term.
     pub(super) fn group_squares(&self, residuals: &[f64]) -> impl Iterator<Item = f64> {
         let layout = self.layout();
         let groups = (0..layout.groups()).map(|group| layout.equations_of_group(group));
-        let ties = (0..layout.ties().len()).map(|tie| layout.equations_of_tie(tie));
+        let terms = (0..layout.terms().len()).map(|term| layout.equations_of_term(term));
         groups
-            .chain(ties)
+            .chain(terms)
             .map(|range| residuals[range.clone()].iter().zip(&self.observation_sd[range]).map(square).sum())
     }
 }

@@ -14,7 +14,7 @@ pub struct Buffers {
     pub(super) columns: Vec<usize>,
 }
 
-/// Number of local blocks or ties in a range, and the mean number of groups per block above which it is reduced.
+/// Number of local blocks or terms in a range, and the mean number of groups per block above which it is reduced.
 const AT_LEAST: usize = 64;
 const GROUPS: usize = 32;
 
@@ -28,13 +28,13 @@ impl AnyProblem<'_> {
         by_stretches(threads, self.layout().locals(), self.at_least(), each)
     }
 
-    /// Maps ranges of ties, in order.
-    pub(super) fn for_ties<T: Send>(
+    /// Maps ranges of terms, in order.
+    pub(super) fn for_terms<T: Send>(
         &self,
         threads: &Threads,
         each: impl Fn(&mut Buffers, Range<usize>) -> T + Sync,
     ) -> Vec<T> {
-        by_stretches(threads, self.layout().ties().len(), AT_LEAST, each)
+        by_stretches(threads, self.layout().terms().len(), AT_LEAST, each)
     }
 
     /// Returns the number of local blocks in a range.

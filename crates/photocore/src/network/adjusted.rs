@@ -157,16 +157,16 @@ pub(super) fn adjusted_points(
     let (model, origin) = (&problem.model, problem.model.origin);
     let cofactors = adjustment.cofactors.as_ref();
     let corrections = &adjustment.last_corrections;
-    let (local, tied) = model.all_coordinates(unknowns);
+    let (local, retained) = model.all_coordinates(unknowns);
     in_order(network.points.len(), points, |point, i| {
-        let values = i.checked_sub(model.locals).map_or_else(|| &local[i], |tie| &tied[tie]);
+        let values = i.checked_sub(model.locals).map_or_else(|| &local[i], |index| &retained[index]);
         let Point { coordinates, sd } = network.points[point];
         let absolute = |k: usize| if sd[k] == 0.0 { coordinates[k] } else { values[k] + origin[k] };
         let first = model.of_point(i).start;
         let own = cofactors.map(|all| match i.checked_sub(model.locals) {
             None => &all.local[9 * i..],
             // Points are the last retained blocks.
-            Some(tied) => &all.retained[all.retained.len() - 9 * (points.len() - model.locals - tied)..],
+            Some(index) => &all.retained[all.retained.len() - 9 * (points.len() - model.locals - index)..],
         });
         let found =
             || own.map_or_else(|| Matrix3::repeat(f64::NAN), |own| Matrix3::from_row_slice(&own[..9]));

@@ -12,7 +12,7 @@ use super::interface::BlockId;
 use super::model::{Bundle, GivenDatum};
 use super::mounts::{AT_PHOTO, Mounts};
 use super::neighbourhood::TOGETHER;
-use super::observations::{Fault, Observation, TiedObservation, Touches};
+use super::observations::{AssembledObservation, Fault, Observation, Touches};
 use super::selection::Selected;
 use crate::geometry::{Matrix3, ObjectSpace, POSE, PoseNumbers, Refraction, local_vertical};
 use crate::parallel;
@@ -78,7 +78,7 @@ impl Network {
         };
         bundle.camera_priors = self.cameras.iter().enumerate().filter_map(prior).collect();
         bundle.assign_cells();
-        bundle.observations = self.tied_observations(selected, &bundle)?;
+        bundle.observations = self.active_observations(selected, &bundle)?;
         Ok(bundle)
     }
 
@@ -159,18 +159,18 @@ impl Network {
     }
 
     /// Returns the active additional observations, last those of single local points in the order of the points.
-    fn tied_observations(
+    fn active_observations(
         &self,
         selected: &Selected,
         model: &Bundle,
-    ) -> Result<Vec<TiedObservation>, NetworkError> {
+    ) -> Result<Vec<AssembledObservation>, NetworkError> {
         let Selected { points, observations, .. } = selected;
         if observations.is_empty() {
             return Ok(vec![]);
         }
         let mut place = vec![0; self.points.len()];
         points.iter().enumerate().for_each(|(own, &point)| place[point] = own);
-        let tied = |&index: &usize| {
+        let active = |&index: &usize| {
             let observation: &Observation = &self.observations[index];
             let touches = observation.touches();
             let points = touches.points.iter().map(|&point| place[point]).collect();
@@ -181,7 +181,7 @@ impl Network {
                 _ => observation.root(),
             };
             let kind = observation.kind();
-            Ok(TiedObservation {
+            Ok(AssembledObservation {
                 index,
                 touches,
                 blocks,
@@ -189,13 +189,13 @@ impl Network {
                 observation: observation.clone(),
             })
         };
-        let tied = |place: usize| tied(&observations[place]);
-        let tied = parallel::map_in_place(observations.len(), TOGETHER, &tied);
-        let mut tied = tied.into_iter().collect::<Result<Vec<TiedObservation>, NetworkError>>()?;
+        let active = |place: usize| active(&observations[place]);
+        let active = parallel::map_in_place(observations.len(), TOGETHER, &active);
+        let mut active = active.into_iter().collect::<Result<Vec<AssembledObservation>, NetworkError>>()?;
         // Observations in the order of the points, which is usual, are not moved.
-        if !tied.is_sorted_by_key(TiedObservation::local) {
-            tied.sort_by_cached_key(TiedObservation::local);
+        if !active.is_sorted_by_key(AssembledObservation::local) {
+            active.sort_by_cached_key(AssembledObservation::local);
         }
-        Ok(tied)
+        Ok(active)
     }
 }

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use super::input::Camera;
-use crate::adjustment::Terms;
+use crate::adjustment::PriorTerms;
 
 /// Observation of the weighted parameters of a camera.
 #[derive(Debug, Clone)]
@@ -26,14 +26,14 @@ impl CameraPrior {
     }
 
     /// Adds its equations at given values: L^-1 (p0 - p), S = L L^T.
-    pub fn add_to(&self, terms: &mut Terms, values: &[f64], prior: &[f64]) {
+    pub fn add_to(&self, prior_terms: &mut PriorTerms, values: &[f64], prior: &[f64]) {
         let count = self.root.nrows();
         // Values without prior information may be arbitrary: their column is zero.
         let weighted = |k: usize| self.root.column(k).iter().any(|&value| value != 0.0);
         let difference = DVector::from_fn(count, |k, _| {
             if weighted(k) { prior[self.first + k] - values[self.first + k] } else { 0.0 }
         });
-        terms.push(self.first, (&self.root * difference).as_slice(), self.root.transpose().as_slice());
+        prior_terms.push(self.first, (&self.root * difference).as_slice(), self.root.transpose().as_slice());
     }
 }
 

@@ -157,8 +157,8 @@ impl Network {
                 names.len() - 1
             })
         };
-        let mut of_ties = vec![0; model.tied_images()];
-        of_ties.extend(model.observations.iter().map(|tied| class_of(tied.observation.kind())));
+        let mut of_terms = vec![0; model.image_terms()];
+        of_terms.extend(model.observations.iter().map(|active| class_of(active.observation.kind())));
         let mut of_unknowns = vec![1; assembled.problem.layout().unknowns()];
         for (owner, unknowns) in (0..model.parameter_blocks()).flat_map(|block| model.owners(block)) {
             of_unknowns[unknowns].fill(match owner {
@@ -167,7 +167,7 @@ impl Network {
                 Owner::Common(_) => 4,
             });
         }
-        let classes = Classes { count: names.len(), of_ties: &of_ties, of_unknowns: &of_unknowns };
+        let classes = Classes { count: names.len(), of_terms: &of_terms, of_unknowns: &of_unknowns };
         let shares = assembled.problem.any().resistance(&state.unknowns, &classes, threads);
         let notable = names.into_iter().zip(shares).filter(|(_, share)| *share > NOTABLE);
         Ok(notable.collect())

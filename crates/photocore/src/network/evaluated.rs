@@ -4,7 +4,7 @@ use super::linearization_point::{LinearizationPoint, PhotoState, write};
 use super::model::{Bundle, MOTIONS};
 use super::mounts::Composed;
 use super::simd::{FEWEST, ImageObservation, linearize_simd};
-use crate::adjustment::{Evaluated, Model, Motions, Terms};
+use crate::adjustment::{Evaluated, Model, Motions, PriorTerms};
 use crate::geometry::angle_axis::rotation_angle_axis;
 use crate::geometry::camera::{CameraModel, each_camera};
 use crate::geometry::{AttitudeNumbers, Vector3};
@@ -33,14 +33,14 @@ impl Bundle {
         each_camera!(camera, camera => write(orientation, camera, point, Some(image.xy), rows));
     }
 
-    pub(super) fn observe_tie(
+    pub(super) fn observe_term(
         &self,
         linearization: &LinearizationPoint,
-        tie: usize,
+        term: usize,
         rows: &mut GroupRows<'_>,
     ) {
-        let Some(observation) = tie.checked_sub(self.tied_images()) else {
-            return self.observe_tied_image(linearization, self.point_images.start[self.locals] + tie, rows);
+        let Some(observation) = term.checked_sub(self.image_terms()) else {
+            return self.observe_image_term(linearization, self.point_images.start[self.locals] + term, rows);
         };
         let own = &self.observations[observation];
         let first_linear = self.observations.len() - self.linear.len();
@@ -48,7 +48,7 @@ impl Bundle {
             return self.linear[linear].write(&linearization.coordinates, rows);
         }
         let coefficients = if rows.local.is_empty() { &mut *rows.shared } else { &mut *rows.local };
-        self.with_tied(linearization, |model| own.write(model, rows.constant, coefficients));
+        self.with_model_values(linearization, |model| own.write(model, rows.constant, coefficients));
     }
 }
 
@@ -87,11 +87,11 @@ impl Model for Bundle {
         step
     }
 
-    fn terms(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> Terms {
-        let mut terms = Terms::default();
-        self.add_weighted_angles(values, prior, sd, &mut terms);
-        self.camera_priors.iter().for_each(|own| own.add_to(&mut terms, values, prior));
-        terms
+    fn prior_terms(&self, values: &[f64], prior: &[f64], sd: &[f64]) -> PriorTerms {
+        let mut prior_terms = PriorTerms::default();
+        self.add_weighted_angles(values, prior, sd, &mut prior_terms);
+        self.camera_priors.iter().for_each(|own| own.add_to(&mut prior_terms, values, prior));
+        prior_terms
     }
 
     /// Intersects the points again.
@@ -100,9 +100,9 @@ impl Model for Bundle {
         let Ok(coordinates) = self.intersect(&self.without_points(&unknowns[photos.clone()])) else {
             return false;
         };
-        let (local, tied) = coordinates.split_at(self.locals);
+        let (local, retained) = coordinates.split_at(self.locals);
         unknowns[..photos.start].copy_from_slice(local.as_flattened());
-        unknowns[photos.end..].copy_from_slice(tied.as_flattened());
+        unknowns[photos.end..].copy_from_slice(retained.as_flattened());
         true
     }
 
@@ -188,8 +188,8 @@ impl Evaluated for At<'_> {
         true
     }
 
-    fn observe_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
-        self.bundle.observe_tie(&self.linearization, tie, rows);
+    fn observe_term(&self, term: usize, rows: &mut GroupRows<'_>) {
+        self.bundle.observe_term(&self.linearization, term, rows);
     }
 
     fn collapsed(&self, before: &[f64]) -> Vec<usize> {
@@ -206,7 +206,7 @@ impl Evaluated for At<'_> {
         if bundle.screens.ran_off { bundle.find_diverging_points(before, linearization) } else { vec![] }
     }
 
-    fn carried(&self, tie: usize) -> Option<(usize, Vec<[f64; MOTIONS]>)> {
-        self.bundle.carried_by_motions(&self.linearization, tie.checked_sub(self.bundle.tied_images())?)
+    fn carried(&self, term: usize) -> Option<(usize, Vec<[f64; MOTIONS]>)> {
+        self.bundle.carried_by_motions(&self.linearization, term.checked_sub(self.bundle.image_terms())?)
     }
 }

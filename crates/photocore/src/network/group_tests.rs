@@ -6,7 +6,7 @@ use nalgebra::{DMatrix, DVector};
 
 use super::error::NetworkError;
 use super::trial::Trial;
-use crate::adjustment::{Alone, EquationOf, GroupTest, Leverages, Terms, weighted};
+use crate::adjustment::{Alone, EquationOf, GroupTest, Leverages, PriorTerms, weighted};
 use crate::normals::Function;
 use crate::{Threads, parallel};
 
@@ -72,7 +72,7 @@ struct Tested<'a> {
     found: &'a Leverages,
     /// Leverages of all groups of equations.
     leverages: &'a [f64],
-    terms: Terms,
+    prior_terms: PriorTerms,
     alone: Option<Alone>,
 }
 
@@ -96,7 +96,7 @@ impl Trial {
         let tested = Tested {
             found,
             leverages: found.cofactors.groups.as_deref().ok_or(NetworkError::State)?,
-            terms: self.terms(&self.assembled.problem.sd, &found.values),
+            prior_terms: self.prior_terms(&self.assembled.problem.sd, &found.values),
             alone: shared.then(|| found.alone(&self.assembled.problem, threads)),
         };
         let [row_starts, block_starts] = [self.groups.row_starts(), self.groups.block_starts()];
@@ -156,7 +156,7 @@ impl Trial {
             return None;
         }
         let residual =
-            |&k: &usize| misclosure(equations[k], &self.observation_sd, tested.found, &tested.terms);
+            |&k: &usize| misclosure(equations[k], &self.observation_sd, tested.found, &tested.prior_terms);
         let residual: Vec<f64> = active.iter().map(residual).collect();
         let (cofactors, by_point) = self.leverages(equations, tested, &active)?;
         let [cofactors, by_point] =
@@ -209,18 +209,18 @@ impl Trial {
         tested: &Tested<'_>,
         active: &[usize],
     ) -> Option<(Vec<f64>, Vec<f64>)> {
-        let (problem, Tested { found, terms, alone, .. }) = (&self.assembled.problem, tested);
+        let (problem, Tested { found, prior_terms, alone, .. }) = (&self.assembled.problem, tested);
         let (size, count) = (equations.len(), active.len());
         let mut by_point = vec![0.0; count * count];
         let unknown = match self.equation(equations[0]) {
             EquationOf::Unknown(unknown) => unknown,
-            EquationOf::Tie { tie, .. } => {
-                let block = &found.cofactors.ties[problem.layout().tie_block(tie)];
+            EquationOf::Term { term, .. } => {
+                let block = &found.cofactors.terms[problem.layout().term_block(term)];
                 return Some((sub(block, size, active), by_point));
             }
             EquationOf::Group { .. } => return None,
         };
-        let rows = self.term_rows(equations, terms).ok()?;
+        let rows = self.prior_rows(equations, prior_terms).ok()?;
         let leverages = sub(&found.of_rows(problem.layout(), &rows).ok()?.equations, size, active);
         let place = unknown / 3;
         if let Some(alone) = alone.as_ref().filter(|_| self.is_tested_whole(place)) {
@@ -233,13 +233,17 @@ impl Trial {
     }
 
     /// Returns the whitened equations of weighted parameters, over all parameters of their block; zero for excluded rows.
-    pub(super) fn term_rows(&self, equations: &[u32], terms: &Terms) -> Result<Vec<Function>, NetworkError> {
+    pub(super) fn prior_rows(
+        &self,
+        equations: &[u32],
+        prior_terms: &PriorTerms,
+    ) -> Result<Vec<Function>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let of = |&equation: &u32| {
             let unknown = equation as usize - problem.layout().equations();
             let range = self.block_with(unknown);
             let mut function: Function = range.clone().map(|unknown| (unknown, 0.0)).collect();
-            let (row, _) = terms.row(unknown);
+            let (row, _) = prior_terms.row(unknown);
             let free = row.into_iter().filter(|(i, _)| problem.sd[*i] != 0.0 && !found.held.contains(i));
             free.for_each(|(i, value)| function[i - range.start].1 = value);
             function
@@ -270,11 +274,16 @@ impl Trial {
 }
 
 /// Returns the misclosure of an equation, divided by its standard deviation.
-pub(super) fn misclosure(equation: u32, observation_sd: &[f64], found: &Leverages, terms: &Terms) -> f64 {
+pub(super) fn misclosure(
+    equation: u32,
+    observation_sd: &[f64],
+    found: &Leverages,
+    prior_terms: &PriorTerms,
+) -> f64 {
     let equation = equation as usize;
     match equation.checked_sub(observation_sd.len()) {
         None => weighted(found.residuals[equation], observation_sd[equation]),
-        Some(unknown) => terms.row(unknown).1,
+        Some(unknown) => prior_terms.row(unknown).1,
     }
 }
 

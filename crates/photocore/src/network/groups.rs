@@ -103,8 +103,8 @@ impl Covariances {
         }
         let mut of = Vec::with_capacity(problem.equations());
         of.extend(model.point_images.order.iter().flat_map(|&image| groups.images[image]));
-        for tied in &model.observations {
-            of.extend(std::iter::repeat_n(groups.observations[tied.index], tied.root.nrows()));
+        for active in &model.observations {
+            of.extend(std::iter::repeat_n(groups.observations[active.index], active.root.nrows()));
         }
         let first = of.len();
         of.resize(problem.equations(), groups.count);

@@ -8,11 +8,11 @@ use super::model::Bundle;
 use crate::adjustment::median;
 use crate::normals::Layout;
 
-/// Returns the block layout of a model at given positions, with its ties.
+/// Returns the block layout of a model at given positions, with its terms.
 pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, NetworkError> {
-    let (groups, tied) = (model.point_images.start[model.locals], model.points.len() - model.locals);
+    let (groups, retained) = (model.point_images.start[model.locals], model.points.len() - model.locals);
     let widths = model.blocks.first.windows(2).map(|pair| pair[1] - pair[0]);
-    let widths: Vec<usize> = widths.chain(vec![3; tied]).collect();
+    let widths: Vec<usize> = widths.chain(vec![3; retained]).collect();
     let main_of = (0..groups).map(|image| model.main_block(image) as u32).collect();
     let mut layout = Layout::new(2, 3, &widths, model.point_images.start[..=model.locals].to_vec(), main_of)?;
     if !(model.blocks.shared.is_empty() && model.mounts.is_empty() && model.image_corrections.is_empty()) {
@@ -30,7 +30,7 @@ pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, Ne
         }
         layout = layout.with_shared(shared_ptr, shared)?;
     }
-    Ok(layout.with_places(places)?.with_ties(model.ties())?.with_pairs(model.pairs())?)
+    Ok(layout.with_places(places)?.with_terms(model.terms())?.with_pairs(model.pairs())?)
 }
 
 impl Interface {
@@ -44,7 +44,7 @@ impl Interface {
         model: &Bundle,
         points: &[usize],
     ) -> Result<(Vec<u32>, Vec<Vec<u32>>), NetworkError> {
-        let (photos, tied) = (model.cameras.len(), &points[model.locals..]);
+        let (photos, retained) = (model.cameras.len(), &points[model.locals..]);
         let block = |&block: &BlockId| {
             let found = match block {
                 BlockId::Photo(photo) => Some(photo),
@@ -52,9 +52,10 @@ impl Interface {
                     model.blocks.shared.binary_search(&camera).ok().map(|shared| photos + shared)
                 }
                 BlockId::Common(common) => model.blocks.of_common[common].map(|own| own.block),
-                BlockId::Point(point) => {
-                    tied.iter().position(|&own| own == point).map(|place| model.parameter_blocks() + place)
-                }
+                BlockId::Point(point) => retained
+                    .iter()
+                    .position(|&own| own == point)
+                    .map(|place| model.parameter_blocks() + place),
             };
             found.map(|block| block as u32).ok_or(NetworkError::NoBlock(block))
         };
@@ -78,9 +79,9 @@ impl Bundle {
         of_cameras.into_iter().map(|places| middle(&places)).collect()
     }
 
-    /// Returns the positions of the blocks of shared parameters: medians over their photos and points; `tied` are the points that are not
+    /// Returns the positions of the blocks of shared parameters: medians over their photos and points; `retained` are the points that are not
     /// local. Coefficients with local support have the position of the trajectory there.
-    pub(super) fn places_of_commons(&self, photos: &[[f64; 3]], tied: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    pub(super) fn places_of_commons(&self, photos: &[[f64; 3]], retained: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let mut of_commons: Vec<Vec<[f64; 3]>> = vec![Vec::new(); self.commons.len()];
         for (photo, &place) in photos.iter().enumerate() {
             self.mounts.always(photo).for_each(|common| of_commons[common].push(place));
@@ -89,9 +90,11 @@ impl Bundle {
         for (common, photo) in self.image_corrections.own() {
             of_commons[common].push(photos[photo]);
         }
-        for touches in self.observations.iter().map(|tied| &tied.touches) {
-            let points =
-                touches.points.iter().filter_map(|&point| tied.get(point.checked_sub(self.locals)?).copied());
+        for touches in self.observations.iter().map(|active| &active.touches) {
+            let points = touches
+                .points
+                .iter()
+                .filter_map(|&point| retained.get(point.checked_sub(self.locals)?).copied());
             let places: Vec<[f64; 3]> =
                 points.chain(touches.photos.iter().map(|&photo| photos[photo])).collect();
             touches.commons.iter().for_each(|&(common, _)| of_commons[common].extend(&places));

@@ -14,18 +14,18 @@ use super::linearization_point::{LinearizationPoint, PhotoState, Refracted};
 use super::mounts::{AT_PHOTO, Mounts};
 use super::neighbourhood::ByPoint;
 use super::observations::{
-    CommonSite, LOCAL, Linear, PhotoSite, PointSite, TiedModel, TiedObservation, Touches,
+    AssembledObservation, CommonSite, LOCAL, Linear, ModelValues, PhotoSite, PointSite, Touches,
 };
 use crate::geometry::{
     self, AttitudeNumbers, Camera, ObjectSpace, Orientation, POSE, PoseNumbers, Refraction, RotationSense,
     Vector3, Vertical,
 };
-use crate::normals::{Cofactors, GroupRows, Tie};
+use crate::normals::{Cofactors, GroupRows, Term};
 use crate::parallel;
 
 /// Model of a network. Local blocks are the points that no observation connects with other objects. Retained blocks are, in this order,
 /// photos (pose and own free camera), shared cameras, shared parameters, and all other points. Image observations of these points and
-/// additional observations are the ties, in this order; an observation of a local point alone is a tie of its local block.
+/// additional observations are the terms, in this order; an observation of a local point alone is a term of its local block.
 #[derive(Debug)]
 pub struct Bundle {
     pub space: ObjectSpace,
@@ -51,7 +51,7 @@ pub struct Bundle {
     pub points: Vec<Point>,
     /// Number of local points.
     pub locals: usize,
-    /// Image observations, sorted by point: first the groups of local points, then ties.
+    /// Image observations, sorted by point: first the groups of local points, then terms.
     pub images: Vec<Image>,
     /// Range of the images of each point, and their indices in the network.
     pub point_images: ByPoint,
@@ -60,7 +60,7 @@ pub struct Bundle {
     /// Photos with steps by a rotation vector about their own axes: those without a fixed angle.
     pub turning: Vec<bool>,
     /// Additional observations, last those of single local points.
-    pub observations: Vec<TiedObservation>,
+    pub observations: Vec<AssembledObservation>,
     /// Equations of these last observations in rectangular space, if they are computed.
     pub linear: Vec<Linear>,
     /// Datum information of the network and the user.
@@ -158,8 +158,8 @@ impl Bundle {
 
     /// Returns the coordinates of all points, relative to the origin, at given parameter values.
     pub fn coordinates<'a>(&self, unknowns: &'a [f64]) -> impl Iterator<Item = &'a [f64; 3]> + use<'a> {
-        let (local, tied) = self.all_coordinates(unknowns);
-        local.iter().chain(tied)
+        let (local, retained) = self.all_coordinates(unknowns);
+        local.iter().chain(retained)
     }
 
     /// Returns the coordinates of local points, and of all others.
@@ -168,25 +168,25 @@ impl Bundle {
         (unknowns[..photos.start].as_chunks().0, unknowns[photos.end..].as_chunks().0)
     }
 
-    /// Returns the ties: images of points that are not local, then additional observations.
-    pub fn ties(&self) -> Vec<Tie> {
+    /// Returns the terms: images of points that are not local, then additional observations.
+    pub fn terms(&self) -> Vec<Term> {
         let images = (self.point_images.start[self.locals]..self.images.len()).map(|image| {
             let point = self.point_of(image);
             let others = self.blocks_of_image(image);
             let blocks = std::iter::once(self.block_of_point(point)).chain(others);
-            Tie { rows: 2, local: None, retained: blocks.map(|block| block as u32).collect() }
+            Term { rows: 2, local: None, retained: blocks.map(|block| block as u32).collect() }
         });
-        let observations = self.observations.iter().map(|tied| {
-            let (rows, local) = (tied.root.nrows(), tied.local().map(|point| point as u32));
-            let retained = tied.blocks.iter().filter(|_| local.is_none()).map(|&block| block as u32);
-            Tie { rows, local, retained: retained.collect() }
+        let observations = self.observations.iter().map(|active| {
+            let (rows, local) = (active.root.nrows(), active.local().map(|point| point as u32));
+            let retained = active.blocks.iter().filter(|_| local.is_none()).map(|&block| block as u32);
+            Term { rows, local, retained: retained.collect() }
         });
         images.chain(observations).collect()
     }
 
     /// Returns the retained block of a point; [`LOCAL`] for a local one.
     fn block_of_point(&self, point: usize) -> usize {
-        point.checked_sub(self.locals).map_or(LOCAL, |tied| self.parameter_blocks() + tied)
+        point.checked_sub(self.locals).map_or(LOCAL, |index| self.parameter_blocks() + index)
     }
 
     /// Returns the number of parameters of a retained block.
@@ -225,8 +225,8 @@ impl Bundle {
         blocks
     }
 
-    /// Returns the number of ties that are image observations.
-    pub fn tied_images(&self) -> usize {
+    /// Returns the number of terms that are image observations.
+    pub fn image_terms(&self) -> usize {
         self.images.len() - self.point_images.start[self.locals]
     }
 
@@ -235,7 +235,7 @@ impl Bundle {
     }
 
     /// Writes the equations of an image observation of a point that is not local.
-    pub(super) fn observe_tied_image(
+    pub(super) fn observe_image_term(
         &self,
         linearization: &LinearizationPoint,
         image: usize,
@@ -257,10 +257,10 @@ impl Bundle {
     }
 
     /// Calls `take` with the model of additional observations at the linearization point.
-    pub(super) fn with_tied<T>(
+    pub(super) fn with_model_values<T>(
         &self,
         linearization: &LinearizationPoint,
-        take: impl FnOnce(&TiedModel<'_>) -> T,
+        take: impl FnOnce(&ModelValues<'_>) -> T,
     ) -> T {
         let point = |point: usize| PointSite {
             point: linearization.points[point],
@@ -285,7 +285,7 @@ impl Bundle {
         };
         let moving =
             |photo: usize| self.moving(linearization.mounted.as_ref()?, &linearization.commons, photo);
-        take(&TiedModel {
+        take(&ModelValues {
             space: self.space,
             origin: self.origin,
             moving: &moving,
@@ -446,12 +446,12 @@ impl Bundle {
     /// Evaluates photos, points and shared parameters at given parameter values.
     pub fn evaluated(&self, unknowns: &[f64]) -> LinearizationPoint {
         let photos = &unknowns[self.parameter_unknowns()];
-        let (local, tied) = self.all_coordinates(unknowns);
+        let (local, retained) = self.all_coordinates(unknowns);
         let mut linearization = self.without_points(photos);
         linearization.refracted = self.refraction.map(|refraction| Refracted {
             refraction,
             at_photos: self.verticals_at_photos(&refraction, photos, &linearization.photos),
-            at_points: verticals(&refraction, self.space, local.iter().chain(tied)),
+            at_points: verticals(&refraction, self.space, local.iter().chain(retained)),
         });
         let place = |&coordinates: &[f64; 3]| geometry::Point::new(self.space, coordinates);
         linearization.points = if self.image_corrections.have_figures() {
@@ -462,9 +462,9 @@ impl Bundle {
         } else {
             parallel::map_in_place(local.len(), 1024, &|point| place(&local[point]))
         };
-        linearization.points.extend(tied.iter().map(place));
+        linearization.points.extend(retained.iter().map(place));
         linearization.coordinates =
-            if self.observations.is_empty() { vec![] } else { [local, tied].concat() };
+            if self.observations.is_empty() { vec![] } else { [local, retained].concat() };
         linearization
     }
 }

@@ -319,8 +319,8 @@ impl Bundle {
     /// Returns the antennas of each pair of shift and drift that no other pair shares.
     fn antennas(&self, placed: &LinearizationPoint) -> Antennas {
         let mut all = Antennas::new();
-        for tied in &self.observations {
-            let Observation::Position(own) = &tied.observation else { continue };
+        for active in &self.observations {
+            let Observation::Position(own) = &active.observation else { continue };
             if own.shift.is_some() || own.drift.is_some() {
                 let pose = placed.photos[own.photo].orientation.pose();
                 let arm = own.lever_arm.value(|common| placed.commons[common].vector());

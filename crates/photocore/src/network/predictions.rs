@@ -9,7 +9,7 @@ use super::error::NetworkError;
 use super::group_tests::{TestOfGroup, TestOfRow, Tests, from_identity, in_units, misclosure, sub};
 use super::test_groups::TestKind;
 use super::trial::Trial;
-use crate::adjustment::{EquationOf, Leverages, Terms};
+use crate::adjustment::{EquationOf, Leverages, PriorTerms};
 use crate::normals::{Function, RowCofactors, dot};
 use crate::{Threads, parallel};
 
@@ -36,8 +36,8 @@ impl Trial {
     /// Predictions before any adjustment.
     pub fn predictions(&self, groups: &[usize], threads: &Threads) -> Result<Tests, NetworkError> {
         let found = self.found()?;
-        let terms = self.terms(&self.sd, &found.values);
-        let near = self.near(groups, &self.observation_sd, &terms, threads)?;
+        let prior_terms = self.prior_terms(&self.sd, &found.values);
+        let near = self.near(groups, &self.observation_sd, &prior_terms, threads)?;
         let starts = self.groups.starts_among(groups);
         let mut all = Tests::inactive(groups.len(), starts[groups.len()], 0);
         for (k, (&group, near)) in groups.iter().zip(&near).enumerate() {
@@ -51,7 +51,7 @@ impl Trial {
                 DMatrix::from_row_slice(count, count, &sub(&near.equations, equations.len(), &out));
             let c = DMatrix::identity(count, count) + leverages;
             let misclosures =
-                out.iter().map(|&k| misclosure(equations[k], &self.observation_sd, found, &terms));
+                out.iter().map(|&k| misclosure(equations[k], &self.observation_sd, found, &prior_terms));
             let d = DVector::from_iterator(count, misclosures);
             let Some(root) = c.clone().cholesky() else { continue };
             let statistic = d.dot(&root.solve(&d));
@@ -70,17 +70,17 @@ impl Trial {
         &self,
         groups: &[usize],
         observation_sd: &[f64],
-        terms: &Terms,
+        prior_terms: &PriorTerms,
         threads: &Threads,
     ) -> Result<Vec<RowCofactors>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
         let layout = problem.layout();
         let failed = |error| NetworkError::new(error, &self.assembled);
-        let (mut places, mut ties) = (vec![], vec![]);
+        let (mut places, mut terms) = (vec![], vec![]);
         for &group in groups {
             match self.equation(self.groups.equations_of(group)[0]) {
                 EquationOf::Group { local, .. } => places.push(local),
-                EquationOf::Tie { tie, .. } => ties.push(tie),
+                EquationOf::Term { term, .. } => terms.push(term),
                 EquationOf::Unknown(_) => {}
             }
         }
@@ -90,7 +90,7 @@ impl Trial {
             found.of_locals(problem, (observation_sd, None), &places, (|_| vec![], None), threads);
         let of_points: HashMap<usize, RowCofactors> =
             places.into_iter().zip(of_points.map_err(failed)?).collect();
-        let mut of_ties = found.rows_of_ties(problem, observation_sd, &ties, threads).into_iter();
+        let mut of_terms = found.rows_of_terms(problem, observation_sd, &terms, threads).into_iter();
         let mut of = |&group: &usize| {
             let equations = self.groups.equations_of(group);
             let rows = match self.equation(equations[0]) {
@@ -98,8 +98,8 @@ impl Trial {
                     let first = equations.len() * (group - layout.groups_of(local).start);
                     return Ok(of_points[&local].selected(first..first + equations.len()));
                 }
-                EquationOf::Tie { .. } => of_ties.next().unwrap_or_default(),
-                EquationOf::Unknown(_) => self.term_rows(equations, terms)?,
+                EquationOf::Term { .. } => of_terms.next().unwrap_or_default(),
+                EquationOf::Unknown(_) => self.prior_rows(equations, prior_terms)?,
             };
             found.of_rows(layout, &rows).map_err(|error| failed(error.into()))
         };
@@ -116,8 +116,8 @@ impl Trial {
             EquationOf::Group { group, local, .. } => {
                 gone(model.of_point(local)) || gone(model.of_block(model.carrier(model.images[group].photo)))
             }
-            EquationOf::Tie { tie, .. } => {
-                problem.layout().tie_columns(tie).any(|unknown| gone(unknown..unknown + 1))
+            EquationOf::Term { term, .. } => {
+                problem.layout().term_columns(term).any(|unknown| gone(unknown..unknown + 1))
             }
             EquationOf::Unknown(unknown) => gone(self.block_with(unknown)),
         }
@@ -142,8 +142,8 @@ impl Trial {
             true => (&self.observation_sd[..], &self.sd[..]),
             false => (&problem.observation_sd[..], &problem.sd[..]),
         };
-        let terms = self.terms(sd, &found.values);
-        let further = |place: usize| self.further(place, &terms);
+        let prior_terms = self.prior_terms(sd, &found.values);
+        let further = |place: usize| self.further(place, &prior_terms);
         let places: Vec<Option<usize>> = points.iter().map(|&point| self.local(point)).collect();
         let locals: Vec<usize> = places.iter().flatten().copied().collect();
         let asked = (observation_sd, gone.then_some(sd));
@@ -153,7 +153,7 @@ impl Trial {
             places.into_iter().map(|place| Some((place?, cofactors.next()?))).collect();
         let of = |k: usize| -> Option<ResidualBlock> {
             let (place, own) = all[k].as_ref()?;
-            let (rows, observed) = self.rows_at(*place, observation_sd, found, &terms);
+            let (rows, observed) = self.rows_at(*place, observation_sd, found, &prior_terms);
             let count = rows.len();
             let (residual, cofactors) = if gone {
                 let own = Some(own.residuals_if_included()).filter(|own| !own.is_empty())?;
@@ -180,14 +180,15 @@ impl Trial {
     /// Whether all observations of a point are its images and its coordinates, which are tested together.
     pub(super) fn is_tested_whole(&self, place: usize) -> bool {
         let problem = &self.assembled.problem;
-        place < problem.model.locals && problem.layout().ties_of(place).is_empty()
+        place < problem.model.locals && problem.layout().terms_of(place).is_empty()
     }
 
     /// Returns the equations of observed coordinates of a local point.
-    fn further(&self, place: usize, terms: &Terms) -> Vec<Function> {
+    fn further(&self, place: usize, prior_terms: &PriorTerms) -> Vec<Function> {
         let mut own = self.on_place(place).iter();
         let control = own.find(|&&group| self.groups.kind(group) == TestKind::Control);
-        let rows = control.and_then(|&group| self.term_rows(self.groups.equations_of(group), terms).ok());
+        let rows =
+            control.and_then(|&group| self.prior_rows(self.groups.equations_of(group), prior_terms).ok());
         rows.unwrap_or_default()
     }
 
@@ -197,7 +198,7 @@ impl Trial {
         place: usize,
         observation_sd: &[f64],
         found: &Leverages,
-        terms: &Terms,
+        prior_terms: &PriorTerms,
     ) -> (Vec<usize>, Vec<f64>) {
         let groups = self.assembled.problem.layout().groups_of(place);
         let (mut rows, mut off) = (vec![], vec![]);
@@ -209,7 +210,7 @@ impl Trial {
             };
             for (k, &equation) in equations.iter().enumerate() {
                 rows.push(first + k);
-                off.push(misclosure(equation, observation_sd, found, terms));
+                off.push(misclosure(equation, observation_sd, found, prior_terms));
             }
         }
         (rows, off)

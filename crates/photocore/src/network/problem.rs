@@ -233,8 +233,8 @@ impl Network {
         // Order: local points, photos and shared cameras, points that observations connect with other objects.
         let locals = model.locals;
         let unknowns = |points: &[[f64; 3]], parameters: &[f64]| {
-            let (local, tied) = points.split_at(locals);
-            [local.as_flattened(), parameters, tied.as_flattened()].concat()
+            let (local, retained) = points.split_at(locals);
+            [local.as_flattened(), parameters, retained.as_flattened()].concat()
         };
         if !model.image_corrections.is_empty() {
             model.activate_knots(&unknowns(&start, &values));
@@ -280,13 +280,13 @@ impl Network {
         used
     }
 
-    /// Returns the positions of the retained blocks for an ordering by position; `tied` are the points that are not local.
-    fn places(&self, model: &Bundle, photos: &[PhotoState], tied: &[[f64; 3]]) -> Vec<[f64; 3]> {
+    /// Returns the positions of the retained blocks for an ordering by position; `retained` are the points that are not local.
+    fn places(&self, model: &Bundle, photos: &[PhotoState], retained: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let centres: Vec<[f64; 3]> = photos.iter().map(|photo| photo.orientation.centre().into()).collect();
         let cameras = model.places_of_cameras(&centres);
-        let tied: Vec<[f64; 3]> = tied.iter().map(|&at| self.space.cartesian(at).into()).collect();
-        let commons = model.places_of_commons(&centres, &tied);
-        [centres, cameras, commons, tied].concat()
+        let retained: Vec<[f64; 3]> = retained.iter().map(|&at| self.space.cartesian(at).into()).collect();
+        let commons = model.places_of_commons(&centres, &retained);
+        [centres, cameras, commons, retained].concat()
     }
 
     /// Returns the initial coordinates of the points.
@@ -327,9 +327,9 @@ impl Bundle {
         }
         let (linearization, mut buffer, mut found) = (self.evaluated(initial), RowBuffer::default(), vec![]);
         for (i, own) in self.observations.iter().enumerate() {
-            let tie = self.tied_images() + i;
-            let mut rows = buffer.tie(layout, tie);
-            self.observe_tie(&linearization, tie, &mut rows);
+            let term = self.image_terms() + i;
+            let mut rows = buffer.term(layout, term);
+            self.observe_term(&linearization, term, &mut rows);
             let (constant, coefficients) = (&*rows.constant, [&*rows.local, &*rows.shared]);
             if !constant.iter().chain(coefficients.into_iter().flatten()).all(|value| value.is_finite()) {
                 let (index, kind, fault) = (own.index, own.observation.kind(), Fault::NotFinite);
@@ -355,6 +355,6 @@ fn observation_sd(model: &Bundle) -> Vec<f64> {
         own.iter_mut().zip(images).for_each(|(sd, image)| *sd = image.sd);
     });
     let mut all = of_images.into_flattened();
-    model.observations.iter().for_each(|tied| all.extend(vec![1.0; tied.root.nrows()]));
+    model.observations.iter().for_each(|active| all.extend(vec![1.0; active.root.nrows()]));
     all
 }

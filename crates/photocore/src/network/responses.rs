@@ -87,8 +87,8 @@ impl Trial {
     /// Effects before any adjustment.
     pub fn effects(&self, groups: &[usize], threads: &Threads) -> Result<Vec<[f64; 3]>, NetworkError> {
         let (found, problem) = (self.found()?, &self.assembled.problem);
-        let terms = self.terms(&problem.sd, &found.values);
-        let near = self.near(groups, &problem.observation_sd, &terms, threads)?;
+        let prior_terms = self.prior_terms(&problem.sd, &found.values);
+        let near = self.near(groups, &problem.observation_sd, &prior_terms, threads)?;
         let is_point =
             |block: Option<usize>| block.is_none_or(|block| block >= problem.model.parameter_blocks());
         let effects = |own: &RowCofactors| -> Vec<[f64; 3]> {

@@ -54,7 +54,7 @@ impl Bundle {
         }
         let moves =
             |common: &usize| self.commons[*common].moves() && self.blocks.of_common[*common].is_some();
-        for touches in self.observations.iter().map(|tied| &tied.touches) {
+        for touches in self.observations.iter().map(|active| &active.touches) {
             let commons = touches.commons.iter().map(|&(common, _)| common).filter(moves).map(of_common);
             let own = touches.photos.iter().map(|&photo| self.carrier(photo));
             joined.join(own.chain(touches.points.iter().map(|&point| of_point(point))).chain(commons));
@@ -203,7 +203,7 @@ impl Bundle {
         let turned = |missed: &Vector3| {
             std::array::from_fn(|k| if k < 3 { Vector3::zeros() } else { displacement(k, missed) })
         };
-        let rows = self.with_tied(linearization, |model| own.carried(model, turned))?;
+        let rows = self.with_model_values(linearization, |model| own.carried(model, turned))?;
         Some((MOTIONS * part, rows))
     }
 

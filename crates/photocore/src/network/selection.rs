@@ -106,17 +106,17 @@ impl Network {
         }
         dropped.sort_by_key(|own| own.point);
         let observations = self.observations_of(&points);
-        let mut tied = Vec::new();
+        let mut retained = Vec::new();
         if !(observations.is_empty() && named.is_empty()) {
             let mut touched = vec![false; self.points.len()];
             let touches = observations.iter().map(|&i| self.observations[i].touches());
             let connected =
                 touches.filter(|touches| self.connects(touches)).flat_map(|touches| touches.points);
             connected.chain(named).for_each(|point| touched[point] = true);
-            (tied, points) = points.into_iter().partition(|&point| touched[point]);
+            (retained, points) = points.into_iter().partition(|&point| touched[point]);
         }
         let locals = points.len();
-        points.extend(tied);
+        points.extend(retained);
         let mut images = ByPoint { start: vec![0], order: Vec::with_capacity(self.images.len()) };
         for &point in &points {
             images.order.extend(all.of(point));

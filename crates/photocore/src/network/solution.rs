@@ -268,15 +268,15 @@ fn observations(
 ) -> Vec<Option<AdjustedObservation>> {
     let (model, layout) = (&problem.model, problem.layout());
     let of = |i: usize| {
-        let (tied, tie) = (&model.observations[i], model.tied_images() + i);
-        let shares = adjustment.cofactors.as_ref().map(|found| &found.ties[layout.tie_block(tie)]);
-        let weight = adjustment.weights.as_ref().map_or(1.0, |all| all[layout.groups() + tie]);
-        let whitened = &adjustment.residuals[layout.equations_of_tie(tie)];
-        AdjustedObservation::new(tied, whitened, shares, weight)
+        let (active, term) = (&model.observations[i], model.image_terms() + i);
+        let shares = adjustment.cofactors.as_ref().map(|found| &found.terms[layout.term_block(term)]);
+        let weight = adjustment.weights.as_ref().map_or(1.0, |all| all[layout.groups() + term]);
+        let whitened = &adjustment.residuals[layout.equations_of_term(term)];
+        AdjustedObservation::new(active, whitened, shares, weight)
     };
     let found = parallel::map(model.observations.len(), TOGETHER, of);
     let mut all = vec![None; network.observations.len()];
-    model.observations.iter().zip(found).for_each(|(tied, own)| all[tied.index] = Some(own));
+    model.observations.iter().zip(found).for_each(|(active, own)| all[active.index] = Some(own));
     all
 }
 
@@ -288,8 +288,8 @@ fn sums_of_squares(
     observations: &[Option<AdjustedObservation>],
 ) -> SumsByType {
     let parameters = problem.model.parameter_unknowns();
-    let terms = problem.any().terms(unknowns);
-    let squares = |range: Range<usize>| terms.sum_of_squares(range);
+    let prior_terms = problem.any().prior_terms(unknowns);
+    let squares = |range: Range<usize>| prior_terms.sum_of_squares(range);
     let rows = problem.layout().rows();
     let of_images = &problem.observation_sd[..rows * problem.model.images.len()];
     SumsByType {

@@ -46,7 +46,7 @@ pub struct TestGroups {
     photos: Vec<u32>,
     row_starts: Vec<usize>,
     block_starts: Vec<usize>,
-    /// Equation of each row, numbered as in [`crate::adjustment::ObservationRows`]: groups, ties, parameters as their own observations.
+    /// Equation of each row, numbered as in [`crate::adjustment::ObservationRows`]: groups, terms, parameters as their own observations.
     equations: Vec<u32>,
     components: Vec<u32>,
     deviations: Vec<f64>,
@@ -293,10 +293,10 @@ impl TestGroups {
         let mut order: Vec<usize> = (0..model.observations.len()).collect();
         order.sort_by_key(|&i| model.observations[i].index);
         for i in order {
-            let tied = &model.observations[i];
-            let first = layout.equations_of_tie(model.tied_images() + i).start;
-            let rows = tied.root.row_iter().enumerate().map(|(k, row)| (first + k, k, row.norm()));
-            self.push((TestKind::Observation, tied.index), [NONE; 2], rows);
+            let active = &model.observations[i];
+            let first = layout.equations_of_term(model.image_terms() + i).start;
+            let rows = active.root.row_iter().enumerate().map(|(k, row)| (first + k, k, row.norm()));
+            self.push((TestKind::Observation, active.index), [NONE; 2], rows);
         }
     }
 

@@ -10,7 +10,7 @@ use super::input::{Network, Options, State};
 use super::problem::Assembled;
 use super::test_groups::TestGroups;
 use crate::adjustment::{
-    self, AdjustError, EquationOf, Leverages, Loss, Method, Model, Requests, Status, Stop, Terms,
+    self, AdjustError, EquationOf, Leverages, Loss, Method, Model, PriorTerms, Requests, Status, Stop,
 };
 use crate::geometry::PoseNumbers;
 use crate::{Context, Threads};
@@ -83,7 +83,7 @@ impl Converged {
         Self { assembled, options, found }
     }
 
-    /// Returns a trial of the network that was adjusted; [`Trial::stand`] needs no computation.
+    /// Returns a trial of the network that was adjusted; [`Trial::linearize`] needs no computation.
     pub fn trial(self, network: &Network) -> Trial {
         let Self { mut assembled, options, found } = self;
         assembled.problem.initial.clone_from(&found.values);
@@ -159,7 +159,7 @@ impl Trial {
     ///
     /// # Errors
     /// Undetermined parameters; an interruption, insufficient memory.
-    pub fn stand(&mut self, context: &mut Context<'_>) -> Result<Outcome, NetworkError> {
+    pub fn linearize(&mut self, context: &mut Context<'_>) -> Result<Outcome, NetworkError> {
         let found = match self.found.take_if(|_| self.stands) {
             Some(found) => found,
             None => {
@@ -204,7 +204,7 @@ impl Trial {
     ///
     /// # Errors
     /// Errors of [`Trial::adjust`].
-    pub fn resist(
+    pub fn robust_weights(
         &mut self,
         loss: Loss,
         iterations: usize,
@@ -226,7 +226,7 @@ impl Trial {
         let (groups, all) = (problem.layout().groups(), found.weights.unwrap_or_default());
         let weight = |group: usize| match self.equation(self.groups.equations_of(group)[0]) {
             EquationOf::Group { group, .. } => all.get(group).copied(),
-            EquationOf::Tie { tie, .. } => all.get(groups + tie).copied(),
+            EquationOf::Term { term, .. } => all.get(groups + term).copied(),
             EquationOf::Unknown(_) => None,
         };
         let weights = (0..self.groups.len()).map(|group| weight(group).unwrap_or(1.0)).collect();
@@ -318,9 +318,9 @@ impl Trial {
     }
 
     /// Returns the prior terms of the parameters, with given standard deviations.
-    pub(super) fn terms(&self, sd: &[f64], values: &[f64]) -> Terms {
+    pub(super) fn prior_terms(&self, sd: &[f64], values: &[f64]) -> PriorTerms {
         let problem = &self.assembled.problem;
-        Terms::new(problem.model.terms(values, &problem.prior, sd), values, &problem.prior, sd)
+        PriorTerms::new(problem.model.prior_terms(values, &problem.prior, sd), values, &problem.prior, sd)
     }
 
     /// Returns the observation of an equation of a test group.
@@ -329,8 +329,8 @@ impl Trial {
         let (layout, rows) = (problem.layout(), problem.layout().rows());
         if let Some(unknown) = equation.checked_sub(layout.equations()) {
             EquationOf::Unknown(unknown)
-        } else if let Some(tie) = layout.tie_with(equation) {
-            EquationOf::Tie { tie, row: equation - layout.equations_of_tie(tie).start }
+        } else if let Some(term) = layout.term_with(equation) {
+            EquationOf::Term { term, row: equation - layout.equations_of_term(term).start }
         } else {
             let group = equation / rows;
             EquationOf::Group { group, local: problem.model.point_of(group), row: equation % rows }
@@ -348,9 +348,9 @@ impl Trial {
 
     /// Returns the index of an additional observation in the model; None for other test groups.
     pub(super) fn observation(&self, group: usize) -> Option<usize> {
-        let tied_images = self.assembled.problem.model.tied_images();
+        let image_terms = self.assembled.problem.model.image_terms();
         match self.equation(self.groups.equations_of(group)[0]) {
-            EquationOf::Tie { tie, .. } => tie.checked_sub(tied_images),
+            EquationOf::Term { term, .. } => term.checked_sub(image_terms),
             _ => None,
         }
     }

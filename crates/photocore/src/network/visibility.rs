@@ -39,9 +39,9 @@ pub(super) fn find_impossible_images(
         Some(block) => *of_shared[block].get_or_insert_with(|| station.camera.fold()),
     };
     let folds: Vec<f64> = photos.iter().zip(&model.blocks.of_camera).map(fold).collect();
-    let (local, tied) = model.all_coordinates(unknowns);
+    let (local, retained) = model.all_coordinates(unknowns);
     let detect = |point: usize| {
-        let at = local.get(point).unwrap_or_else(|| &tied[point - local.len()]);
+        let at = local.get(point).unwrap_or_else(|| &retained[point - local.len()]);
         let position = model.space.cartesian(*at);
         let (mut nearest, mut unseen) = (f64::INFINITY, ImpossibleImages::default());
         for image in model.point_images.start[point]..model.point_images.start[point + 1] {

@@ -2,7 +2,7 @@
 
 use super::model::Bundle;
 use super::observations::misalignment;
-use crate::adjustment::Terms;
+use crate::adjustment::PriorTerms;
 use crate::geometry::{AttitudeNumbers, Matrix3, RotationSense, Vector3};
 
 /// Distance of phi from 90 degrees, in standard deviations, below which angles are treated as an observed rotation.
@@ -16,7 +16,13 @@ impl Bundle {
     ///
     /// With rho = K d(angles), an angle a, observed as a0 with standard deviation s, has its row of K^-1 / s and the constant (a0 - a) / s.
     /// The sum of squares equals the one for angles as parameters.
-    pub(super) fn add_weighted_angles(&self, values: &[f64], prior: &[f64], sd: &[f64], terms: &mut Terms) {
+    pub(super) fn add_weighted_angles(
+        &self,
+        values: &[f64],
+        prior: &[f64],
+        sd: &[f64],
+        prior_terms: &mut PriorTerms,
+    ) {
         for photo in 0..self.cameras.len() {
             let Some(sense) = self.rotation_vector_sense(photo) else { continue };
             let first = self.of_block(photo).start + 3;
@@ -32,7 +38,7 @@ impl Bundle {
             } else {
                 angle_equations(sense, angles, observed, &sd)
             };
-            terms.push(first, constant.as_slice(), coefficients.transpose().as_slice());
+            prior_terms.push(first, constant.as_slice(), coefficients.transpose().as_slice());
         }
     }
 }

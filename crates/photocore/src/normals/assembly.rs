@@ -1,4 +1,4 @@
-//! Assembly of the front of a supernode: local blocks, ties, contributions of child systems, and priors.
+//! Assembly of the front of a supernode: local blocks, terms, contributions of child systems, and priors.
 
 use std::sync::Arc;
 
@@ -126,11 +126,12 @@ impl Formation<'_> {
         starts.into_iter().step_by(few).collect()
     }
 
-    /// Adds the ties of a supernode; returns the sum of squares of their right-hand sides.
-    pub(super) fn add_ties(&self, front: &mut Front<'_>, index: usize) -> f64 {
+    /// Adds the terms of a supernode; returns the sum of squares of their right-hand sides.
+    pub(super) fn add_terms(&self, front: &mut Front<'_>, index: usize) -> f64 {
         let (mut sum_of_squares, mut buffer) = (0.0, RowBuffer::default());
-        for &tie in self.system.ties.at(index) {
-            let (columns, rows) = self.system.tie_in_front(index, self.equations, tie as usize, &mut buffer);
+        for &term in self.system.terms.at(index) {
+            let (columns, rows) =
+                self.system.term_in_front(index, self.equations, term as usize, &mut buffer);
             for (coefficients, constant) in rows {
                 front.add_equation(&columns, &coefficients, constant);
                 sum_of_squares += constant * constant;
@@ -177,22 +178,22 @@ impl Sums {
     }
 }
 
-/// Ascending columns of a front, and the coefficients with the right-hand side of each equation of a tie.
-pub(super) type TieInFront = (Vec<usize>, Vec<(Vec<f64>, f64)>);
+/// Ascending columns of a front, and the coefficients with the right-hand side of each equation of a term.
+pub(super) type TermInFront = (Vec<usize>, Vec<(Vec<f64>, f64)>);
 
 impl System {
-    /// Returns the equations of a tie that is assembled in supernode `node`: the columns of the front, ascending, and the coefficients with
+    /// Returns the equations of a term that is assembled in supernode `node`: the columns of the front, ascending, and the coefficients with
     /// the right-hand side of each equation.
-    pub(super) fn tie_in_front(
+    pub(super) fn term_in_front(
         &self,
         node: usize,
         equations: &dyn Equations,
-        tie: usize,
+        term: usize,
         buffer: &mut RowBuffer,
-    ) -> TieInFront {
-        let mut rows = buffer.tie(&self.layout, tie);
-        equations.write_tie(tie, &mut rows);
-        let at = self.rows_of(node, &self.layout.ties()[tie].retained);
+    ) -> TermInFront {
+        let mut rows = buffer.term(&self.layout, term);
+        equations.write_term(term, &mut rows);
+        let at = self.rows_of(node, &self.layout.terms()[term].retained);
         let mut order: Vec<usize> = (0..at.len()).collect();
         order.sort_unstable_by_key(|&k| at[k]);
         let sorted = |row: &[f64]| order.iter().map(|&k| row[k]).collect();

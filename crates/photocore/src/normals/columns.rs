@@ -170,7 +170,7 @@ impl Factor {
         let reduced = context.run(Phase::Solve, system.layout.locals(), |control| {
             let counts = (system.symbolic.unknowns(), system.symbolic.outer_unknowns());
             let mut others = control.allocated(system.of_others(rights))?;
-            system.add_rights_of_ties(equations, &mut others);
+            system.add_rights_of_terms(equations, &mut others);
             let at_node = |index: usize| system.rights_at_node(equations, index, control);
             let found: Vec<Reduced<1>> = parallel::map_each((0..self.eliminated.len()).collect(), &at_node);
             // In a fixed order, independent of the threads.
@@ -206,15 +206,15 @@ impl System {
         found
     }
 
-    /// Adds A^T l of ties of retained blocks to a right-hand side in elimination order.
-    fn add_rights_of_ties(&self, equations: &dyn Equations, others: &mut [f64]) {
+    /// Adds A^T l of terms of retained blocks to a right-hand side in elimination order.
+    fn add_rights_of_terms(&self, equations: &dyn Equations, others: &mut [f64]) {
         let (layout, symbolic) = (&self.layout, &*self.symbolic);
         let mut buffer = RowBuffer::default();
-        for (index, tie) in layout.ties().iter().enumerate().filter(|(_, tie)| tie.local.is_none()) {
+        for (index, term) in layout.terms().iter().enumerate().filter(|(_, term)| term.local.is_none()) {
             let of_block = |&block: &u32| symbolic.range(symbolic.position(block as usize));
-            let columns: Vec<usize> = tie.retained.iter().flat_map(of_block).collect();
-            let mut written = buffer.tie(layout, index);
-            equations.write_tie(index, &mut written);
+            let columns: Vec<usize> = term.retained.iter().flat_map(of_block).collect();
+            let mut written = buffer.term(layout, index);
+            equations.write_term(index, &mut written);
             for (row, constant) in written.shared.chunks_exact(columns.len()).zip(&*written.constant) {
                 columns.iter().zip(row).for_each(|(&column, a)| others[column] += a * constant);
             }

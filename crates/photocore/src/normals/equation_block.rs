@@ -127,7 +127,7 @@ impl System {
     /// observations of a point, are added. Q_oo is the inverse over all coupled blocks, H = N_ll^-1 N_lo and C = B - A H. Then a Q a^T = C
     /// Q_oo C^T + A N_ll^-1 A^T. Q a^T is Q_oo C^T for the others, N_ll^-1 A^T - H Q_oo C^T for the local block.
     ///
-    /// * `formed`, `weight`: all equations of the local block in the inverse, with those of its ties, and the prior weights of all unknowns;
+    /// * `formed`, `weight`: all equations of the local block in the inverse, with those of its terms, and the prior weights of all unknowns;
     /// * `asked`: equations with requested cofactors, possibly with other weights.
     ///
     /// # Errors

@@ -1,7 +1,7 @@
 //! Observation equations and priors: the input of a formation.
 
 use super::contribution::Contribution;
-use super::layout::{Layout, LayoutError, Tie};
+use super::layout::{Layout, LayoutError, Term};
 
 /// Source of the equations of a system.
 ///
@@ -18,8 +18,8 @@ pub trait Equations: Sync {
         }
     }
 
-    /// Writes the equations of one tie, every element of `rows` (see [`RowBuffer::tie`]). Only called if the layout has ties.
-    fn write_tie(&self, _tie: usize, _rows: &mut GroupRows<'_>) {}
+    /// Writes the equations of one term, every element of `rows` (see [`RowBuffer::term`]). Only called if the layout has terms.
+    fn write_term(&self, _term: usize, _rows: &mut GroupRows<'_>) {}
 
     /// Returns the prior equations of single unknowns.
     fn prior(&self) -> &Prior;
@@ -30,7 +30,7 @@ pub trait Equations: Sync {
     }
 }
 
-/// Memory for the rows of one group or tie.
+/// Memory for the rows of one group or term.
 #[derive(Debug, Default)]
 pub struct RowBuffer {
     constant: Vec<f64>,
@@ -44,9 +44,9 @@ impl RowBuffer {
         self.rows(layout.rows(), [layout.local_dim(), main, layout.shared_width(group)])
     }
 
-    /// Returns the rows of a tie, with undefined contents: coefficients of its local block, or of all retained blocks as shared ones.
-    pub fn tie(&mut self, layout: &Layout, tie: usize) -> GroupRows<'_> {
-        let Tie { rows, local, retained } = &layout.ties()[tie];
+    /// Returns the rows of a term, with undefined contents: coefficients of its local block, or of all retained blocks as shared ones.
+    pub fn term(&mut self, layout: &Layout, term: usize) -> GroupRows<'_> {
+        let Term { rows, local, retained } = &layout.terms()[term];
         let width = layout.unknowns_of(retained).count();
         self.rows(*rows, [local.map_or(0, |_| layout.local_dim()), 0, width])
     }
@@ -60,7 +60,7 @@ impl RowBuffer {
     }
 }
 
-/// Output rows of one group or tie. Matrices are stored row by row.
+/// Output rows of one group or term. Matrices are stored row by row.
 #[derive(Debug)]
 pub struct GroupRows<'a> {
     /// Right-hand sides l (rows).
@@ -74,8 +74,8 @@ pub struct GroupRows<'a> {
 }
 
 impl GroupRows<'_> {
-    /// Returns the coefficients of a tie; columns are the unknowns of its blocks, in order.
-    pub fn of_tie(&mut self) -> &mut [f64] {
+    /// Returns the coefficients of a term; columns are the unknowns of its blocks, in order.
+    pub fn of_term(&mut self) -> &mut [f64] {
         if self.local.is_empty() { self.shared } else { self.local }
     }
 

@@ -216,7 +216,7 @@ impl Formation<'_> {
             }
         }
         let mut sums = self.assemble(&mut front, index, cached)?;
-        sums.sum_of_squares += self.add_ties(&mut front, index);
+        sums.sum_of_squares += self.add_terms(&mut front, index);
         self.add_contributions(&mut front, index);
         let open = symbolic.open() == Some(index);
         if !open {

@@ -9,7 +9,7 @@ pub(super) const MANY: usize = 500;
 /// Position of a block that is not in a list.
 pub(crate) const NOWHERE: u32 = u32::MAX;
 
-/// Undirected graph of retained blocks in compressed form, neighbours ascending. Edges: a shared local block, tie, contribution or pair.
+/// Undirected graph of retained blocks in compressed form, neighbours ascending. Edges: a shared local block, term, contribution or pair.
 #[derive(Debug, Clone)]
 pub struct Graph {
     ptr: Vec<usize>,
@@ -20,13 +20,13 @@ impl Graph {
     /// Builds the graph of a layout.
     pub fn new(layout: &Layout) -> Self {
         let retained = layout.retained();
-        let ties = layout.ties().iter().map(|tie| &tie.retained[..]);
+        let terms = layout.terms().iter().map(|term| &term.retained[..]);
         let contributions = layout.contributions().iter().map(|blocks| &blocks[..]);
         let pairs = layout.pairs().iter().map(|pair| &pair[..]);
-        let ties: Vec<&[u32]> = ties.chain(contributions).chain(pairs).collect();
-        let mut ties_of = vec![Vec::new(); retained];
-        for (index, tie) in ties.iter().enumerate() {
-            tie.iter().for_each(|&block| ties_of[block as usize].push(index));
+        let terms: Vec<&[u32]> = terms.chain(contributions).chain(pairs).collect();
+        let mut terms_of = vec![Vec::new(); retained];
+        for (index, term) in terms.iter().enumerate() {
+            term.iter().for_each(|&block| terms_of[block as usize].push(index));
         }
         let (unit_ptr, units) = units_by_block(layout);
         let joined = |seen_by: &mut Vec<u32>, block: usize| {
@@ -41,8 +41,8 @@ impl Graph {
                 layout.main_blocks_of(unit as usize).iter().copied().for_each(&mut join);
                 layout.all_shared_of(unit as usize).iter().copied().for_each(&mut join);
             }
-            for &tie in &ties_of[block] {
-                ties[tie].iter().copied().for_each(&mut join);
+            for &term in &terms_of[block] {
+                terms[term].iter().copied().for_each(&mut join);
             }
             neighbours.sort_unstable();
             neighbours
@@ -75,7 +75,7 @@ impl Graph {
         self.len() == 0
     }
 
-    /// Returns the blocks that share a local block, tie, contribution or requested pair with `block`.
+    /// Returns the blocks that share a local block, term, contribution or requested pair with `block`.
     pub fn neighbours(&self, block: usize) -> impl Iterator<Item = usize> + '_ {
         self.neighbours[self.ptr[block]..self.ptr[block + 1]].iter().map(|&other| other as usize)
     }

@@ -1,7 +1,7 @@
 //! Block normal equations: formation, reduction, ordering, factorisation, solution and selected inverse.
 //!
 //! The vector of unknowns consists of *local* blocks of equal size (object points, stars) and *retained* blocks of any size (photos,
-//! cameras, a comparator). Each group of equations involves one local block, one main retained block and optional shared ones. Ties are
+//! cameras, a comparator). Each group of equations involves one local block, one main retained block and optional shared ones. Terms are
 //! equations among retained blocks. A system is processed in five steps:
 //!
 //! 1. [`Layout`]: the unknowns, and the blocks in each group of equations;
@@ -91,7 +91,7 @@ pub use factor::{Factor, FactorOptions};
 pub use functions::{Function, Functions};
 pub use graph::Graph;
 pub use invert::{Inversion, InvertOptions};
-pub use layout::{Layout, LayoutError, Tie};
+pub use layout::{Layout, LayoutError, Term};
 pub use ordering::Ordering;
 pub use panels::SelectedInverse;
 pub use solve::SolveOptions;

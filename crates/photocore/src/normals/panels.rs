@@ -82,7 +82,7 @@ impl<T> PerSupernode<T> {
 }
 
 /// Blocks of N^-1 inside the pattern of the factor. They include diagonal blocks, and blocks of retained blocks that share a local block, a
-/// tie, a contribution or a pair of the layout.
+/// term, a contribution or a pair of the layout.
 #[derive(Debug)]
 pub struct SelectedInverse {
     pub(super) panels: Panels,

@@ -14,7 +14,8 @@ impl System {
             let have = |blocks: &[u32]| blocks.iter().all(|&block| has(symbolic.position(block as usize)));
             let children =
                 s.children.iter().all(|&child| symbolic.supernodes()[child].rows.iter().all(|&row| has(row)));
-            let ties = self.ties.at(front).iter().all(|&tie| have(&layout.ties()[tie as usize].retained));
+            let terms =
+                self.terms.at(front).iter().all(|&term| have(&layout.terms()[term as usize].retained));
             let below = &self.contributions;
             let below = below.at(front).iter().all(|&part| have(&layout.contributions()[part as usize]));
             // Units of one batch have the same pattern.
@@ -24,7 +25,7 @@ impl System {
                 incidence.positions_of(layout, unit).iter().all(|&position| has(position as usize))
                     && incidence.members(incidence.set_of(unit)).iter().all(shared)
             });
-            if !(children && ties && below && units) {
+            if !(children && terms && below && units) {
                 return Err(LayoutError::Pattern { front });
             }
         }
@@ -40,7 +41,7 @@ impl System {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::normals::{Layout, Ordering, Symbolic, Tie};
+    use crate::normals::{Layout, Ordering, Symbolic, Term};
 
     /// Three local blocks with a single group each, for one of three retained blocks; a fourth retained block is unused.
     fn uncoupled() -> Layout {
@@ -49,11 +50,11 @@ mod tests {
 
     #[test]
     fn a_pattern_that_lacks_what_goes_to_a_front_is_refused() {
-        let tie = Tie { rows: 1, local: None, retained: vec![0, 2] };
+        let term = Term { rows: 1, local: None, retained: vec![0, 2] };
         let together = [
             Layout::new(1, 1, &[1, 1, 1, 1], vec![0, 2, 3], vec![0, 1, 2]).unwrap(),
             uncoupled().with_shared(vec![0, 0, 0, 1], vec![3]).unwrap(),
-            uncoupled().with_ties(vec![tie]).unwrap(),
+            uncoupled().with_terms(vec![term]).unwrap(),
             uncoupled().as_part(vec![], vec![vec![1, 2]]).unwrap(),
             uncoupled().with_pairs(vec![[0, 3]]).unwrap(),
         ];

@@ -1,6 +1,6 @@
 //! Ordered systems, ready for repeated formation.
 //!
-//! Assembly nodes of ties and contributions.
+//! Assembly nodes of terms and contributions.
 //!
 //! Sizes of vectors and of cached local eliminations.
 
@@ -35,7 +35,7 @@ pub struct System {
     pub(super) layout: Layout,
     pub(super) symbolic: Arc<Symbolic>,
     pub(super) incidence: Incidence,
-    pub(super) ties: Nodes,
+    pub(super) terms: Nodes,
     pub(super) contributions: Nodes,
     pub(super) tree: Tree,
     pub(super) workspace: Workspace,
@@ -58,7 +58,7 @@ impl System {
     pub(super) fn with_pattern(layout: Layout, symbolic: Symbolic) -> Result<Self, LayoutError> {
         let symbolic = Arc::new(symbolic);
         let incidence = Incidence::new(&layout, &symbolic);
-        let ties = Nodes::new(layout.ties().iter().map(|tie| &tie.retained), &symbolic);
+        let terms = Nodes::new(layout.terms().iter().map(|term| &term.retained), &symbolic);
         let contributions = Nodes::new(layout.contributions().iter(), &symbolic);
         let work = |(index, supernode): (usize, &super::symbolic::Supernode)| {
             let factored = if symbolic.open() == Some(index) { 0.0 } else { supernode.operations() };
@@ -72,7 +72,7 @@ impl System {
             layout,
             symbolic,
             incidence,
-            ties,
+            terms,
             contributions,
             tree,
             workspace: Workspace::default(),
@@ -115,7 +115,7 @@ fn formation_work(incidence: &Incidence, layout: &Layout, index: usize) -> f64 {
     incidence.batches_at(index).iter().map(of_batch).sum::<usize>() as f64
 }
 
-/// Lists of retained blocks (of ties or contributions), grouped by *assembly node*: the supernode of the block that is eliminated first.
+/// Lists of retained blocks (of terms or contributions), grouped by *assembly node*: the supernode of the block that is eliminated first.
 /// All other blocks of a list are in the pattern of the node.
 #[derive(Debug)]
 pub(super) struct Nodes {

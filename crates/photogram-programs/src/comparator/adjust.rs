@@ -109,7 +109,7 @@ impl Solution {
         let residuals = std::mem::take(&mut adjustment.residuals);
         let redundancy = adjustment.redundancy.take();
         let sum_of_squares = problem.sum_of_squares(&residuals)
-            + problem.any().terms(&unknowns).sum_of_squares(0..unknowns.len());
+            + problem.any().prior_terms(&unknowns).sum_of_squares(0..unknowns.len());
         let cases = problem.model.left_handed.len();
         let (placements, comparator) =
             (layout.all_retained().start..layout.retained_range(cases).start, layout.retained_range(cases));

@@ -183,7 +183,7 @@ impl Calibration {
         let dims: Vec<usize> = self.pointings.iter().map(|_| 3).chain([COMMON]).collect();
         Layout::new(2, 2, &dims, model.start.clone(), retained)?
             .with_shared((0..=count).collect(), vec![common; count])?
-            .with_ties(model.ties.iter().map(|(_, tie)| tie.clone()).collect())?
+            .with_terms(model.terms.iter().map(|(_, term)| term.clone()).collect())?
             .with_pairs((0..common).map(|pointing| [pointing, common]).collect())
     }
 }

@@ -5,7 +5,7 @@ use photocore::adjustment::{Evaluated, Model};
 use photocore::internal;
 
 use crate::sky::Standard;
-use photocore::normals::{GroupRows, Tie};
+use photocore::normals::{GroupRows, Term};
 
 /// Upper triangular root R of a weight matrix P = R^T R.
 pub type Root = [[f64; 2]; 2];
@@ -55,7 +55,7 @@ pub struct StarImages<'a> {
     /// Root of the weights of each star's catalogue place; None if it is unknown or fixed.
     pub catalogue: Vec<Option<Root>>,
     /// Constraints without stars.
-    pub ties: Vec<(Tied, Tie)>,
+    pub terms: Vec<(Tied, Term)>,
 }
 
 /// Camera, attitudes and stars at given values of the unknowns.
@@ -158,7 +158,7 @@ impl<'a> StarImages<'a> {
             start: vec![0],
             roots: vec![],
             catalogue: vec![],
-            ties: calibration.ties()?,
+            terms: calibration.terms()?,
         };
         for (index, images) in of_star.into_iter().enumerate() {
             let star = &calibration.stars[index];
@@ -229,12 +229,12 @@ fn root(weight: [[f64; 2]; 2], name: impl Fn() -> String) -> Result<Root, Stella
 
 impl Calibration {
     /// Returns the constraints of the axis and of the parameter weights, with their blocks.
-    fn ties(&self) -> Result<Vec<(Tied, Tie)>, StellarError> {
-        let (mut ties, common) = (Vec::new(), self.pointings.len() as u32);
+    fn terms(&self) -> Result<Vec<(Tied, Term)>, StellarError> {
+        let (mut terms, common) = (Vec::new(), self.pointings.len() as u32);
         if let Some(axis) = self.axis {
             let root = root(axis.weight, || "the axis".into())?;
-            let tie = Tie { rows: 2, local: None, retained: vec![axis.pointing as u32, common] };
-            ties.push((Tied::Axis(root), tie));
+            let term = Term { rows: 2, local: None, retained: vec![axis.pointing as u32, common] };
+            terms.push((Tied::Axis(root), term));
         }
         for row in 0..self.weights.parameters.len() {
             // The shared block is always included: its cofactors with every attitude are needed.
@@ -245,9 +245,9 @@ impl Calibration {
                 .collect();
             retained.sort_unstable();
             retained.dedup();
-            ties.push((Tied::Parameters(row), Tie { rows: 1, local: None, retained }));
+            terms.push((Tied::Parameters(row), Term { rows: 1, local: None, retained }));
         }
-        Ok(ties)
+        Ok(terms)
     }
 
     /// Returns parameter, given value and root element for each nonzero element in a row of the weight root.
@@ -320,10 +320,10 @@ impl Evaluated for StarsAt<'_> {
         }
     }
 
-    fn observe_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
+    fn observe_term(&self, term: usize, rows: &mut GroupRows<'_>) {
         let Self { model, sight } = self;
         let calibration = model.calibration;
-        let (tied, Tie { retained, .. }) = &model.ties[tie];
+        let (tied, Term { retained, .. }) = &model.terms[term];
         rows.shared.fill(0.0);
         match tied {
             Tied::Axis(root) => {

@@ -124,9 +124,9 @@ impl Solution {
                 place_tests[star] = tested(weighted, unit, self.adjustment.prior_redundancy(2 * local));
             }
         }
-        if let Some(tie) = model.ties.iter().position(|(tied, _)| matches!(tied, Tied::Axis(_))) {
+        if let Some(term) = model.terms.iter().position(|(tied, _)| matches!(tied, Tied::Axis(_))) {
             let layout = problem.layout();
-            self.axis_test = of_rows(layout.equations_of_tie(tie).start);
+            self.axis_test = of_rows(layout.equations_of_term(term).start);
         }
     }
 }
@@ -203,7 +203,7 @@ impl Calibration {
             model.catalogue[star].map(|root| square(root_times(&root, off)))
         });
         let (mut parameters, mut axis) = (0.0, 0.0);
-        for (tied, _) in &model.ties {
+        for (tied, _) in &model.terms {
             match tied {
                 Tied::Axis(root) => axis = axis_residual.map_or(0.0, |v| square(root_times(root, v))),
                 Tied::Parameters(row) => parameters += self.off_given(sight, *row).powi(2),

@@ -11,11 +11,11 @@ use super::covariances::{BlockCovariances, factored, refused};
 use super::node::{BlockRow, Node};
 use super::solution::BlockSolution;
 use super::state::{BlockState, DatumRow, datum_of};
-use super::tables::Told;
+use super::tables::SolutionColumns;
 use super::trial::{NetworkTrial, tried};
 use crate::adjustment::unknown;
 use crate::arrays::{Array, Indices, Vector, indices, numbers};
-use crate::work::{Workers, watched};
+use crate::work::{Workers, supervised};
 
 /// Block with the options of its adjustment.
 #[pyclass(frozen, module = "photogram._photocore")]
@@ -28,8 +28,8 @@ pub struct BlockNetwork {
 
 impl BlockNetwork {
     /// Converts a solution to columns without trajectory records.
-    fn told(&self, solution: Solution, pool: &Threads) -> Told {
-        Told::without_records(solution, self.records, pool)
+    fn columns(&self, solution: Solution, pool: &Threads) -> SolutionColumns {
+        SolutionColumns::without_records(solution, self.records, pool)
     }
 }
 
@@ -48,7 +48,7 @@ impl BlockNetwork {
         let workers = Workers::of(threads, self.network.images.len());
         let inner = datum.map(datum_of).transpose()?;
         let start = start.map(|start| start.state.clone());
-        let told = watched(py, workers, progress, |context| {
+        let columns = supervised(py, workers, progress, |context| {
             let adjustment = self.network.adjustment(&self.options);
             let adjustment = match (&inner, &start, &keep) {
                 (Some(NetworkDatum::Inner(inner)), ..) => adjustment.in_datum(inner),
@@ -56,9 +56,9 @@ impl BlockNetwork {
                 (_, _, Some(points)) => adjustment.kept(points),
                 _ => adjustment,
             };
-            adjustment.run_in(context).map(|solution| self.told(solution, context.threads))
+            adjustment.run_in(context).map(|solution| self.columns(solution, context.threads))
         })?;
-        BlockSolution::new(py, told.map_err(|error| refused(&error))?)
+        BlockSolution::new(py, columns.map_err(|error| refused(&error))?)
     }
 
     #[pyo3(signature = (state, datum, *, threads, progress))]
@@ -72,11 +72,11 @@ impl BlockNetwork {
     ) -> PyResult<Py<BlockSolution>> {
         let workers = Workers::of(threads, self.network.images.len());
         let datum = datum_of(datum)?;
-        let told = watched(py, workers, progress, |context| {
+        let columns = supervised(py, workers, progress, |context| {
             let solution = self.network.in_datum(&self.options, &state.state, &datum, context);
-            solution.map(|solution| self.told(solution, context.threads))
+            solution.map(|solution| self.columns(solution, context.threads))
         })?;
-        BlockSolution::new(py, told.map_err(|error| refused(&error))?)
+        BlockSolution::new(py, columns.map_err(|error| refused(&error))?)
     }
 
     #[pyo3(signature = (state, *, threads, progress))]
@@ -109,7 +109,7 @@ impl BlockNetwork {
         threads: usize,
     ) -> PyResult<Vec<(&'static str, f64)>> {
         let workers = Workers::of(threads, self.network.images.len());
-        let found = watched(py, workers, None, |context| {
+        let found = supervised(py, workers, None, |context| {
             self.network.resistance(&self.options, &state.state, context.threads)
         })?;
         found.map_err(|error| refused(&error))
@@ -118,7 +118,7 @@ impl BlockNetwork {
     #[pyo3(signature = (*, threads))]
     fn held_for_datum(&self, py: Python<'_>, threads: usize) -> PyResult<Vec<(usize, usize)>> {
         let workers = Workers::of(threads, self.network.images.len());
-        let held = watched(py, workers, None, |context| {
+        let held = supervised(py, workers, None, |context| {
             photogram_parts::held_for_datum(&self.network, &self.options, context.threads)
         })?;
         held.map_err(|error| refused(&error))
@@ -139,7 +139,7 @@ impl BlockNetwork {
         let names: Vec<UnknownName> = indices("names", &names)?.as_chunks().0.to_vec();
         let values = numbers("values", &values)?;
         let workers = Workers::of(threads, self.network.images.len());
-        let found = watched(py, workers, None, |context| {
+        let found = supervised(py, workers, None, |context| {
             let adjusted = AdjustedInParts { middle, held: &held, names: &names, values: &values };
             photogram_parts::parts_in_datum(&self.network, &self.options, &inner, adjusted, context.threads)
         })?;

@@ -10,13 +10,13 @@ use pyo3::prelude::*;
 use super::covariances::{BlockCovariances, factored};
 use super::solution::CollectionSolution;
 use super::state::BlockState;
-use super::tables::Told;
+use super::tables::SolutionColumns;
 use super::trial::{NetworkTrial, tried};
 use super::{CollectionError, failure, images, points, said};
 use crate::adjustment::{named_loss, named_ordering, unknown};
 use crate::arrays::{Array, Indices, Matrix, check_lengths, rows, slices, table};
 use crate::memory::LOADED;
-use crate::work::{Workers, watched};
+use crate::work::{Workers, supervised};
 
 /// Collection with the options of its adjustment.
 #[pyclass(frozen, module = "photogram._photocore")]
@@ -39,15 +39,15 @@ impl CollectionNetwork {
     ) -> PyResult<Py<CollectionSolution>> {
         let workers = Workers::of(threads, self.network.images.len());
         let start = start.map(|start| start.state.clone());
-        let told = watched(py, workers, progress, |context| {
+        let columns = supervised(py, workers, progress, |context| {
             let adjustment = self.network.adjustment(&self.options);
             let adjustment = match &start {
                 None => adjustment,
                 Some(start) => adjustment.from_state(start),
             };
-            adjustment.run_in(context).map(|solution| Told::new(solution, context.threads))
+            adjustment.run_in(context).map(|solution| SolutionColumns::new(solution, context.threads))
         })?;
-        CollectionSolution::new(py, told.map_err(|error| refused(&error))?, self.unknowns)
+        CollectionSolution::new(py, columns.map_err(|error| refused(&error))?, self.unknowns)
     }
 
     #[pyo3(signature = (state, *, threads, progress))]

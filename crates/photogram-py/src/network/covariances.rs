@@ -10,7 +10,7 @@ use super::suspects::NetworkSuspects;
 use super::{BlockError, failure};
 use crate::adjustment::unknown;
 use crate::arrays::{Array, Blocks, Indices, Matrix, Vector, group_rows, matrix};
-use crate::work::{Workers, watched};
+use crate::work::{Workers, supervised};
 
 /// Covariances of an adjusted block, from one factor.
 #[pyclass(frozen, module = "photogram._photocore")]
@@ -48,7 +48,7 @@ pub fn factored(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<BlockCovariances> {
     let images = network.images.len();
-    let found = watched(py, Workers::of(threads, images), progress, |context| {
+    let found = supervised(py, Workers::of(threads, images), progress, |context| {
         network.covariances(options, &state.state, None, context)
     })?;
     found
@@ -76,7 +76,7 @@ impl BlockCovariances {
         let count = partials.as_array().nrows();
         let partials: Vec<f64> = partials.as_array().iter().copied().collect();
         let of = of_rows(of)?;
-        let found = watched(py, Workers::of(0, self.images), None, |context| {
+        let found = supervised(py, Workers::of(0, self.images), None, |context| {
             self.covariances.influences(&partials, &of, context.threads)
         })?;
         let influences = found.map_err(|error| (self.refused)(&error))?;
@@ -94,7 +94,7 @@ impl BlockCovariances {
         progress: Option<Py<PyAny>>,
     ) -> PyResult<Matrix<'py>> {
         let (rows, columns) = (of_rows(rows)?, columns.map(of_rows).transpose()?);
-        let found = watched(py, Workers::of(threads, self.images), progress, |context| {
+        let found = supervised(py, Workers::of(threads, self.images), progress, |context| {
             self.covariances.cofactors(&rows, columns.as_deref(), context)
         })?;
         matrix(py, found.map_err(|error| (self.refused)(&error))?, columns.is_none())
@@ -111,7 +111,7 @@ impl BlockCovariances {
     ) -> PyResult<Matrix<'py>> {
         let of = of_rows(of)?;
         let partials: Vec<f64> = partials.as_array().iter().copied().collect();
-        let found = watched(py, Workers::of(threads, self.images), progress, |context| {
+        let found = supervised(py, Workers::of(threads, self.images), progress, |context| {
             self.covariances.propagate(&partials, &of, context)
         })?;
         matrix(py, found.map_err(|error| (self.refused)(&error))?, true)
@@ -132,7 +132,7 @@ impl BlockCovariances {
         let groups = groups_of(groups)?;
         let probing = Probing { exact, vectors, seed };
         let workers = Workers::of(threads, self.images);
-        let found = watched(py, workers, progress, |context| match classes {
+        let found = supervised(py, workers, progress, |context| match classes {
             None => self.covariances.group_squares(&groups, &probing, context),
             Some(classes) => {
                 let squares = self.covariances.own_squares(&groups, classes, &probing, context)?;
@@ -153,7 +153,7 @@ impl BlockCovariances {
     ) -> PyResult<Blocks<'py>> {
         let count = columns.as_array().shape().first().copied().unwrap_or(0);
         let columns: Vec<f64> = columns.as_array().iter().copied().collect();
-        let found = watched(py, Workers::of(threads, self.images), progress, |context| {
+        let found = supervised(py, Workers::of(threads, self.images), progress, |context| {
             self.covariances.project_images(&columns, context)
         })?;
         let found = found.map_err(|error| (self.refused)(&error))?;

@@ -12,7 +12,7 @@ use crate::arrays::{
     Array, Blocks, Indices, InputError, Matrix, blocks, check_lengths, from_rows, indices, matrices, numbers,
     row_major, rows, table,
 };
-use crate::work::{Workers, watched};
+use crate::work::{Workers, supervised};
 
 /// Positions, attitudes, sources and reasons for missing poses of photos; positions of points; rejected observations; contradicted control;
 /// the frame; the misfit.
@@ -86,7 +86,7 @@ pub fn find_first_values<'py>(
         sightings: (0..seen.len()).map(sighting).collect(),
     };
     let workers = Workers::of(threads, given.sightings.len());
-    match watched(py, workers, None, |context| given.find(context))? {
+    match supervised(py, workers, None, |context| given.find(context))? {
         Ok(found) => row(py, found),
         Err(error @ FirstValuesError::Index(_)) => Err(InputError::new_err(error.to_string())),
         Err(error) => Err(PyValueError::new_err(error.to_string())),

@@ -14,11 +14,11 @@ use pyo3::types::{IntoPyDict, PyDict};
 
 use super::covariances::refused;
 use super::solution::BlockSolution;
-use super::tables::Told;
+use super::tables::SolutionColumns;
 use super::{FailureRow, failure};
 use crate::adjustment::unknown;
 use crate::arrays::{Array, InputError, Vector, numbers};
-use crate::work::{Workers, watched};
+use crate::work::{Workers, supervised};
 
 /// Matrix, right-hand side and diagonal of the Schur complement of a node.
 type ContributionRow<'py> = (Array<'py>, Array<'py>, Array<'py>);
@@ -124,8 +124,9 @@ impl Node {
     #[pyo3(signature = (state, *, threads))]
     fn relocate<'py>(&self, py: Python<'py>, state: Array<'py>, threads: usize) -> PyResult<Vector<'py>> {
         let state = numbers("state", &state)?;
-        let moved =
-            watched(py, self.workers(threads), None, |context| self.node.relocate(&state, context.threads))?;
+        let moved = supervised(py, self.workers(threads), None, |context| {
+            self.node.relocate(&state, context.threads)
+        })?;
         moved.map(|moved| PyArray1::from_vec(py, moved)).map_err(|error| failed(&error))
     }
 
@@ -137,8 +138,9 @@ impl Node {
         threads: usize,
     ) -> PyResult<(f64, f64, f64, f64, f64)> {
         let state = numbers("state", &state)?;
-        let found =
-            watched(py, self.workers(threads), None, |context| self.node.objective(&state, context.threads))?;
+        let found = supervised(py, self.workers(threads), None, |context| {
+            self.node.objective(&state, context.threads)
+        })?;
         let (sums, minimised) = found.map_err(|error| failed(&error))?;
         Ok((sums.camera, sums.ground, sums.plates, sums.observations, minimised))
     }
@@ -162,7 +164,7 @@ impl Node {
                 diagonal: Cow::Borrowed(slice("the diagonal of a contribution", diagonal)?),
             });
         }
-        let formed = watched(py, self.workers(threads), None, |context| {
+        let formed = supervised(py, self.workers(threads), None, |context| {
             let mut formed = self.node.form(&state, &given, (damping, curved), context)?;
             let contribution = formed.take_contribution();
             Ok((formed, contribution))
@@ -188,11 +190,11 @@ impl Node {
         threads: usize,
     ) -> PyResult<Py<BlockSolution>> {
         let (state, before) = (numbers("state", &state)?, numbers("before", &before)?);
-        let told = watched(py, self.workers(threads), None, |context| {
+        let columns = supervised(py, self.workers(threads), None, |context| {
             let solution = self.node.solution(&state, &before, context.threads)?;
-            Ok(Told::without_records(solution, self.records, context.threads))
+            Ok(SolutionColumns::without_records(solution, self.records, context.threads))
         })?;
-        BlockSolution::new(py, told.map_err(|error: Failure| failed(&error))?)
+        BlockSolution::new(py, columns.map_err(|error: Failure| failed(&error))?)
     }
 }
 
@@ -211,7 +213,7 @@ impl Node {
         let interface = Interface { outer: blocks(outer)?, below, middle, held };
         let workers = Workers::of(threads, network.images.len());
         let node =
-            watched(py, workers, None, |context| Core::new(network, options, interface, context.threads))?;
+            supervised(py, workers, None, |context| Core::new(network, options, interface, context.threads))?;
         node.map(|node| Self { node: Arc::new(node), records }).map_err(|error| failed(&error))
     }
 
@@ -250,7 +252,7 @@ impl FormedNode {
         ask: impl FnOnce(&mut Formed, &mut Context<'_>) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
         let workers = Workers::of(threads, self.node.images());
-        let found = watched(py, workers, None, |context| match &mut *lock(&self.formed) {
+        let found = supervised(py, workers, None, |context| match &mut *lock(&self.formed) {
             Some(formed) => ask(formed, context).map(Some),
             None => Ok(None),
         })?;
@@ -355,14 +357,14 @@ impl FormedNode {
         };
         let formed = lock(&self.formed).take().ok_or_else(|| used_up("the factor"))?;
         let workers = Workers::of(threads, self.node.images());
-        let found = watched(py, workers, None, |context| {
+        let found = supervised(py, workers, None, |context| {
             let found = self.node.invert(formed, given, &state, datum, context);
             found.map(|(solution, below)| {
-                (Told::without_records(solution, self.records, context.threads), below)
+                (SolutionColumns::without_records(solution, self.records, context.threads), below)
             })
         })?;
-        let (told, below) = found.map_err(|error| failed(&error))?;
+        let (columns, below) = found.map_err(|error| failed(&error))?;
         let below = below.into_iter().map(|triangle| PyArray1::from_vec(py, triangle)).collect();
-        Ok((BlockSolution::new(py, told)?, below))
+        Ok((BlockSolution::new(py, columns)?, below))
     }
 }

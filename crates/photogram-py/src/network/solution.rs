@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
 use super::state::BlockState;
-use super::tables::Told;
+use super::tables::SolutionColumns;
 use super::{FailureRow, failure};
 use crate::adjustment::{IterationRow, iteration_row, operations, predictions, seconds, status_name};
 use crate::arrays::{Blocks, Matrix, blocks, table};
@@ -116,29 +116,29 @@ pub struct NetworkSolution {
 
 impl NetworkSolution {
     /// Creates the solution of a block or a collection; `unknowns` per photo are the pose and, in collections, the camera.
-    fn new(py: Python<'_>, told: &mut Told, unknowns: usize, what: &str) -> PyResult<Self> {
-        let kept = Arc::new(Mutex::new(told.solution.converged.take()));
-        let Solution { adjustment, state, joint, weak, .. } = &told.solution;
+    fn new(py: Python<'_>, columns: &mut SolutionColumns, unknowns: usize, what: &str) -> PyResult<Self> {
+        let kept = Arc::new(Mutex::new(columns.solution.converged.take()));
+        let Solution { adjustment, state, joint, weak, .. } = &columns.solution;
         let effort = &adjustment.effort;
         let weak_points = weak.points.iter().map(|weak| (weak.point, weak.ratio, weak.distance));
         Ok(Self {
             status: status_name(adjustment.status),
             initial_sum_of_squares: adjustment.initial_sum_of_squares,
             iterations: adjustment.iterations.iter().map(iteration_row).collect(),
-            photo_cofactors: photo_cofactors(py, &told.solution.photos, unknowns)?.unbind(),
-            photo_redundancy: photo_redundancy(py, &told.solution.photos, unknowns)?.unbind(),
-            point_positions: table(py, take(&mut told.point_positions))?.unbind(),
-            point_cofactors: blocks(py, take(&mut told.point_cofactors))?.unbind(),
-            point_redundancy: table(py, take(&mut told.point_redundancy))?.unbind(),
-            point_rays: PyArray1::from_vec(py, take(&mut told.point_rays)).unbind(),
-            residuals: table(py, take(&mut told.residuals))?.unbind(),
-            redundancy: table(py, take(&mut told.redundancy))?.unbind(),
-            standardized: table(py, take(&mut told.standardized))?.unbind(),
-            image_weights: PyArray1::from_vec(py, take(&mut told.image_weights)).unbind(),
+            photo_cofactors: photo_cofactors(py, &columns.solution.photos, unknowns)?.unbind(),
+            photo_redundancy: photo_redundancy(py, &columns.solution.photos, unknowns)?.unbind(),
+            point_positions: table(py, take(&mut columns.point_positions))?.unbind(),
+            point_cofactors: blocks(py, take(&mut columns.point_cofactors))?.unbind(),
+            point_redundancy: table(py, take(&mut columns.point_redundancy))?.unbind(),
+            point_rays: PyArray1::from_vec(py, take(&mut columns.point_rays)).unbind(),
+            residuals: table(py, take(&mut columns.residuals))?.unbind(),
+            redundancy: table(py, take(&mut columns.redundancy))?.unbind(),
+            standardized: table(py, take(&mut columns.standardized))?.unbind(),
+            image_weights: PyArray1::from_vec(py, take(&mut columns.image_weights)).unbind(),
             redundancy_excess: adjustment.redundancy_excess,
-            undetermined: told.solution.undetermined.as_ref().map(|error| failure(error, what)),
-            degrees_of_freedom: told.solution.degrees_of_freedom,
-            variance_of_unit_weight: told.solution.variance_of_unit_weight,
+            undetermined: columns.solution.undetermined.as_ref().map(|error| failure(error, what)),
+            degrees_of_freedom: columns.solution.degrees_of_freedom,
+            variance_of_unit_weight: columns.solution.variance_of_unit_weight,
             counts: (adjustment.counts.observations, adjustment.counts.weighted, adjustment.counts.unknowns),
             ordering: effort.ordering.name(),
             predictions: predictions(py, adjustment)?.unbind(),
@@ -146,7 +146,7 @@ impl NetworkSolution {
             formations: effort.formations,
             seconds: seconds(py, adjustment)?.unbind(),
             state: Py::new(py, BlockState { state: state.clone(), kept, joint: joint.clone() })?,
-            datum: told.solution.datum.held.clone(),
+            datum: columns.solution.datum.held.clone(),
             weak: weak.photos.clone(),
             weak_points: weak_points.collect(),
         })
@@ -178,9 +178,9 @@ pub struct BlockSolution {
 }
 
 impl BlockSolution {
-    pub fn new(py: Python<'_>, mut told: Told) -> PyResult<Py<Self>> {
-        let base = NetworkSolution::new(py, &mut told, 6, "block")?;
-        let Told { solution: found, point_last_corrections, .. } = told;
+    pub fn new(py: Python<'_>, mut columns: SolutionColumns) -> PyResult<Py<Self>> {
+        let base = NetworkSolution::new(py, &mut columns, 6, "block")?;
+        let SolutionColumns { solution: found, point_last_corrections, .. } = columns;
         let three = |first: usize| {
             let part = |photo: &AdjustedPhoto| std::array::from_fn::<_, 3, _>(|k| photo.pose[first + k]);
             table(py, found.photos.iter().map(part).collect()).map(Bound::unbind)
@@ -230,9 +230,9 @@ pub struct CollectionSolution {
 
 impl CollectionSolution {
     /// Creates the solution of a collection with `unknowns` per photo.
-    pub fn new(py: Python<'_>, mut told: Told, unknowns: usize) -> PyResult<Py<Self>> {
-        let base = NetworkSolution::new(py, &mut told, unknowns, "collection")?;
-        let Told { solution: found, point_rays_behind, .. } = told;
+    pub fn new(py: Python<'_>, mut columns: SolutionColumns, unknowns: usize) -> PyResult<Py<Self>> {
+        let base = NetworkSolution::new(py, &mut columns, unknowns, "collection")?;
+        let SolutionColumns { solution: found, point_rays_behind, .. } = columns;
         let parameters =
             found.photos.iter().flat_map(|photo| [&photo.pose, photo.camera.as_slice()].concat());
         let own = Self {

@@ -6,7 +6,7 @@ use photocore::network::{AdjustedPoint, Solution};
 use rayon::Scope;
 
 /// Solution with points and image observations in columns, built in parallel without the GIL.
-pub struct Told {
+pub struct SolutionColumns {
     pub solution: Solution,
     pub point_positions: Vec<[f64; 3]>,
     pub point_cofactors: Vec<[[f64; 3]; 3]>,
@@ -20,7 +20,7 @@ pub struct Told {
     pub image_weights: Vec<f64>,
 }
 
-impl Told {
+impl SolutionColumns {
     /// Moves points and image observations of a solution into columns. Excluded ones are NaN.
     pub fn new(solution: Solution, pool: &Threads) -> Self {
         pool.install(|| Self::on_pool(solution))
@@ -39,7 +39,7 @@ impl Told {
         let points: Vec<Option<AdjustedPoint>> = std::mem::take(&mut solution.points);
         let images: Vec<Option<Observed<2>>> = std::mem::take(&mut solution.images);
         let (three, two) = ([f64::NAN; 3], [f64::NAN; 2]);
-        let mut told = Self {
+        let mut columns = Self {
             solution,
             point_positions: vec![],
             point_cofactors: vec![],
@@ -53,18 +53,18 @@ impl Told {
             image_weights: vec![],
         };
         rayon::scope(|scope| {
-            fill(scope, &mut told.residuals, &images, two, |image| image.residual);
-            fill(scope, &mut told.redundancy, &images, two, |image| image.redundancy);
-            fill(scope, &mut told.standardized, &images, two, |image| image.standardized);
-            fill(scope, &mut told.image_weights, &images, f64::NAN, |image| image.weight);
-            fill(scope, &mut told.point_cofactors, &points, [three; 3], |point| point.cofactors.data.0);
-            fill(scope, &mut told.point_positions, &points, three, |point| point.coordinates);
-            fill(scope, &mut told.point_redundancy, &points, three, |point| point.redundancy);
-            fill(scope, &mut told.point_last_corrections, &points, three, |point| point.last_correction);
-            fill(scope, &mut told.point_rays, &points, 0, |point| point.rays as i64);
-            fill(scope, &mut told.point_rays_behind, &points, 0, |point| point.behind as i64);
+            fill(scope, &mut columns.residuals, &images, two, |image| image.residual);
+            fill(scope, &mut columns.redundancy, &images, two, |image| image.redundancy);
+            fill(scope, &mut columns.standardized, &images, two, |image| image.standardized);
+            fill(scope, &mut columns.image_weights, &images, f64::NAN, |image| image.weight);
+            fill(scope, &mut columns.point_cofactors, &points, [three; 3], |point| point.cofactors.data.0);
+            fill(scope, &mut columns.point_positions, &points, three, |point| point.coordinates);
+            fill(scope, &mut columns.point_redundancy, &points, three, |point| point.redundancy);
+            fill(scope, &mut columns.point_last_corrections, &points, three, |point| point.last_correction);
+            fill(scope, &mut columns.point_rays, &points, 0, |point| point.rays as i64);
+            fill(scope, &mut columns.point_rays_behind, &points, 0, |point| point.behind as i64);
         });
-        told
+        columns
     }
 }
 

@@ -13,7 +13,7 @@ use super::state::BlockState;
 use super::suspects::NetworkSuspects;
 use crate::adjustment::status_name;
 use crate::arrays::{Array, Matrix, Vector, rows, table};
-use crate::work::{Workers, watched};
+use crate::work::{Workers, supervised};
 
 /// Network that is adjusted without some of its observations.
 #[pyclass(module = "photogram._photocore")]
@@ -111,7 +111,7 @@ impl NetworkTrial {
         work: impl FnOnce(&Trial, &Threads) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
         let workers = Workers::of(self.threads, self.images);
-        watched(py, workers, None, |context| work(&self.trial, context.threads))?
+        supervised(py, workers, None, |context| work(&self.trial, context.threads))?
             .map_err(|error| (self.refused)(&error))
     }
 
@@ -123,7 +123,7 @@ impl NetworkTrial {
         work: impl FnOnce(&mut Session<'_>) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
         let (workers, trial) = (Workers::of(self.threads, self.images), &mut self.trial);
-        let found = watched(py, workers, progress, |context| {
+        let found = supervised(py, workers, progress, |context| {
             work(&mut Session { trial, context: context.reborrow() })
         })?;
         found.map_err(|error| (self.refused)(&error))
@@ -151,7 +151,7 @@ pub fn tried(
         return Ok(NetworkTrial { trial, images, photos, threads, refused });
     }
     let state = state.map(|state| state.state.clone());
-    let found = watched(py, Workers::of(threads, images), None, |context| {
+    let found = supervised(py, Workers::of(threads, images), None, |context| {
         network.trial(options, state.as_ref(), context.threads)
     })?;
     found
@@ -179,7 +179,7 @@ impl NetworkTrial {
     }
 
     fn stand(&mut self, py: Python<'_>) -> PyResult<OutcomeRow> {
-        self.run(py, None, |own| own.trial.stand(&mut own.context)).map(outcome_row)
+        self.run(py, None, |own| own.trial.linearize(&mut own.context)).map(outcome_row)
     }
 
     #[pyo3(signature = (rows, points, photos, *, tolerance, progress))]

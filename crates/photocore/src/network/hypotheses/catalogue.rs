@@ -172,7 +172,7 @@ impl<'a> Catalogue<'a> {
             let first = self.bundle.of_block(photo).start + 3;
             self.sd[first..first + 3].iter().any(|sd| sd.is_finite() && *sd > 0.0)
         };
-        self.bundle.observations.iter().any(|tied| tied.observation.kind() == "attitude")
+        self.bundle.observations.iter().any(|active| active.observation.kind() == "attitude")
             || (0..self.bundle.cameras.len()).any(weighted)
     }
 
@@ -190,8 +190,8 @@ impl<'a> Catalogue<'a> {
     pub(super) fn image_of(&self, of: EquationOf) -> Option<(usize, usize, usize)> {
         match of {
             EquationOf::Group { group, local, row } => Some((group, local, row)),
-            EquationOf::Tie { tie, row } if tie < self.bundle.tied_images() => {
-                let image = self.bundle.point_images.start[self.bundle.locals] + tie;
+            EquationOf::Term { term, row } if term < self.bundle.image_terms() => {
+                let image = self.bundle.point_images.start[self.bundle.locals] + term;
                 Some((image, self.bundle.point_of(image), row))
             }
             _ => None,
@@ -214,7 +214,7 @@ impl AdditionalParameters for Catalogue<'_> {
         }
         let single = self.single.keys().filter_map(|of| match *of {
             EquationOf::Unknown(unknown) => Some(unknown / 3),
-            EquationOf::Tie { tie, .. } => self.layout.ties()[tie].local.map(|local| local as usize),
+            EquationOf::Term { term, .. } => self.layout.terms()[term].local.map(|local| local as usize),
             EquationOf::Group { .. } => None,
         });
         let displaced = self.displaced.keys().map(|own| own.1 / 3);
@@ -229,9 +229,9 @@ impl AdditionalParameters for Catalogue<'_> {
         let image = self.image_of(equation.of);
         let seen = match equation.of {
             EquationOf::Unknown(unknown) => self.seen_by_itself(unknown),
-            EquationOf::Tie { .. } if image.is_some() => Some(Seen::Images),
-            EquationOf::Tie { tie, .. } => {
-                match self.bundle.observations[tie - self.bundle.tied_images()].observation.kind() {
+            EquationOf::Term { .. } if image.is_some() => Some(Seen::Images),
+            EquationOf::Term { term, .. } => {
+                match self.bundle.observations[term - self.bundle.image_terms()].observation.kind() {
                     "control" => Some(Seen::Control),
                     "position" => Some(Seen::Positions),
                     "attitude" => Some(Seen::Attitudes),

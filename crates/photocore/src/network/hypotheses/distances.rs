@@ -8,15 +8,15 @@ const SCALE: f64 = 1e-2;
 
 pub(super) fn add(catalogue: &mut Catalogue<'_>) {
     let bundle = catalogue.bundle;
-    let tied = bundle.observations.iter().enumerate();
-    let lengths: Vec<(EquationOf, f64)> = tied
-        .filter_map(|(number, tied)| match (tied.observation.kind(), &tied.touches.points[..]) {
+    let active = bundle.observations.iter().enumerate();
+    let lengths: Vec<(EquationOf, f64)> = active
+        .filter_map(|(number, active)| match (active.observation.kind(), &active.touches.points[..]) {
             ("distance", &[first, second]) => {
                 let length = (catalogue.place_of_point(first).position
                     - catalogue.place_of_point(second).position)
                     .norm();
-                let of = EquationOf::Tie { tie: bundle.tied_images() + number, row: 0 };
-                Some((of, length / tied.root[(0, 0)]))
+                let of = EquationOf::Term { term: bundle.image_terms() + number, row: 0 };
+                Some((of, length / active.root[(0, 0)]))
             }
             _ => None,
         })

@@ -41,9 +41,9 @@ impl Catalogue<'_> {
 
     /// Points with observed or fixed coordinates: the point of the network, its place.
     pub fn control_points(&self, trial: &Trial) -> Vec<(usize, Place)> {
-        let tied = self.bundle.observations.iter().filter(|tied| tied.observation.kind() == "control");
+        let active = self.bundle.observations.iter().filter(|active| active.observation.kind() == "control");
         let mut observed = vec![false; trial.assembled.points.len()];
-        tied.flat_map(|tied| &tied.touches.points).for_each(|&place| observed[place] = true);
+        active.flat_map(|active| &active.touches.points).for_each(|&place| observed[place] = true);
         let given = |place: usize| self.sd[self.bundle.of_point(place)].iter().any(|sd| sd.is_finite());
         let points = trial.assembled.points.iter().enumerate();
         let control = points.filter(|(place, _)| given(*place) || observed[*place]);
@@ -52,10 +52,10 @@ impl Catalogue<'_> {
 
     /// Photos whose position was observed, or is fixed.
     pub fn positions(&self) -> Vec<(usize, Place)> {
-        let tied = self.bundle.observations.iter().filter(|tied| tied.observation.kind() == "position");
-        let tied: Vec<usize> = tied.flat_map(|tied| tied.touches.photos.iter().copied()).collect();
+        let active = self.bundle.observations.iter().filter(|active| active.observation.kind() == "position");
+        let active: Vec<usize> = active.flat_map(|active| active.touches.photos.iter().copied()).collect();
         let mut observed = vec![false; self.bundle.cameras.len()];
-        tied.into_iter().for_each(|photo| observed[photo] = true);
+        active.into_iter().for_each(|photo| observed[photo] = true);
         let of = |(photo, observed): (usize, bool)| {
             let first = self.bundle.of_block(photo).start;
             let given = self.sd[first..first + 3].iter().any(|sd| sd.is_finite());

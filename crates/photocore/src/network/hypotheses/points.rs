@@ -12,10 +12,10 @@ const FEWEST: usize = 2;
 
 pub(super) fn add(catalogue: &mut Catalogue<'_>, names: &[usize]) {
     let bundle = catalogue.bundle;
-    // Only images of points that are not local are ties with other observations.
+    // Only images of points that are not local are terms with other observations.
     let mut counts = vec![0; bundle.points.len()];
-    for tied in &bundle.observations {
-        tied.touches.points.iter().for_each(|&place| counts[place] += 1);
+    for active in &bundle.observations {
+        active.touches.points.iter().for_each(|&place| counts[place] += 1);
     }
     for (place, count) in counts.iter_mut().enumerate() {
         let weighted = catalogue.sd[bundle.of_point(place)].iter().any(|sd| sd.is_finite());

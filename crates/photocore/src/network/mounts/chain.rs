@@ -72,7 +72,7 @@ impl PartialPose {
     }
 
     /// Restarts the composition from an independent pose.
-    pub fn stand(&mut self, pose: Pose) {
+    pub fn set_pose(&mut self, pose: Pose) {
         self.pose = pose;
         self.used = 0;
     }

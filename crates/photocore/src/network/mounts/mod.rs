@@ -338,7 +338,7 @@ impl PoseInputs<'_> {
             self.lead(carrier, at, chain);
         } else if !self.mounts.is_replaced(photo) {
             let own = (self.photo)(photo);
-            chain.stand(*own.pose());
+            chain.set_pose(*own.pose());
             if chain.steps() {
                 chain.add([(InBlock::whole(photo, POSE), 1.0)].into_iter(), own.steps());
             }

@@ -143,7 +143,7 @@ impl MountModel for OnTrajectory {
         let Trajectory { position, rotation, .. } = known.trajectory(self.trajectory);
         let flight = self.flown_at(self.time(at, pose_inputs), pose_inputs);
         let Motion { velocity, rate, pose: reached } = flight.motion;
-        pose.stand(reached);
+        pose.set_pose(reached);
         if !pose.steps() {
             return;
         }

@@ -2,7 +2,7 @@
 
 use smallvec::SmallVec;
 
-use super::{Observation, TiedObservation};
+use super::{AssembledObservation, Observation};
 
 /// An adjusted observation, component by component.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,16 +43,16 @@ impl AdjustedObservation {
     ///
     /// With B = a Q a^T and whitened a: Qvv = L (I - B) L^T, Qvv S^-1 = L (I - B) L^-1, S^-1 Qvv S^-1 = L^-T (I - B) L^-1.
     pub(in super::super) fn new(
-        tied: &TiedObservation,
+        active: &AssembledObservation,
         whitened: &[f64],
         shares: Option<&[f64]>,
         weight: f64,
     ) -> Self {
-        let (n, root) = (whitened.len(), &tied.root);
+        let (n, root) = (whitened.len(), &active.root);
         // L^-1, row by row.
         let mut inverse = SmallVec::<[f64; 9]>::from_elem(0.0, n * n);
         (0..n).for_each(|k| inverse[k * (n + 1)] = 1.0);
-        tied.whiten(&mut inverse, n);
+        active.whiten(&mut inverse, n);
         let product =
             |a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64| (0..n).map(|k| a(k) * b(k)).sum::<f64>();
         let residual = (0..n).map(|i| product(&|k| root[(i, k)], &|k| whitened[k])).collect();

@@ -5,9 +5,9 @@
 use nalgebra::DMatrix;
 use serde_json::Value;
 
+use super::assembled::ModelValues;
 use super::rows::{CommonSite, PhotoSite, PointSite};
-use super::tied::TiedModel;
-use super::{Named, Observation, TiedObservation};
+use super::{AssembledObservation, Named, Observation};
 use crate::geometry::{Camera, Matrix3, ObjectSpace, Orientation, Perspective, Point, Vector3};
 use crate::network::commons::{CartesianCommon, Common, CommonKind, CommonState, InBlock};
 use crate::network::mounts::tests::mounted;
@@ -130,8 +130,9 @@ fn assert_case(case: &Value) -> bool {
         1 => 6,
         _ => commons[block - 200].1.len(),
     };
-    let tied = TiedObservation { index: 0, observation, touches, blocks: ours.clone(), root: covariance };
-    let model = TiedModel {
+    let active =
+        AssembledObservation { index: 0, observation, touches, blocks: ours.clone(), root: covariance };
+    let model = ModelValues {
         space: SPACE,
         origin: [0.0; 3],
         point: &|i| PointSite { point: Point::new(SPACE, points[i]), coordinates: points[i], block: i },
@@ -142,7 +143,7 @@ fn assert_case(case: &Value) -> bool {
     };
     let all: usize = ours.iter().map(|&block| width(block)).sum();
     let (mut constant, mut coefficients) = (vec![0.0; components], vec![0.0; components * all]);
-    tied.write(&model, &mut constant, &mut coefficients);
+    active.write(&model, &mut constant, &mut coefficients);
     for (row, expected) in list(&case["computed"]).into_iter().enumerate() {
         // Planes have observed distances from the origin; all other observed values are zero.
         let found = if of_residual { constant[row] } else { -constant[row] };
@@ -201,8 +202,8 @@ fn assert_rig(case: &Value) {
 fn every_kind_has_the_golden_values_and_partials() {
     let Some(file) = golden("ties.json") else { return };
     let cases = file["cases"].as_array().unwrap();
-    let ties = cases.iter().filter(|case| assert_case(case)).count();
+    let terms = cases.iter().filter(|case| assert_case(case)).count();
     cases.iter().filter(|case| case["kind"] == "image, rig").for_each(assert_rig);
     // Forward and backward images of fixed cameras belong to another module.
-    assert_eq!((ties, cases.len()), (11, 15));
+    assert_eq!((terms, cases.len()), (11, 15));
 }

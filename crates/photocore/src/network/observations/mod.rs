@@ -4,10 +4,10 @@
 //! minus computed values and the partials by positions and rotations. [`Rows`] converts these to the parameter columns.
 
 mod adjusted;
+mod assembled;
 mod model;
 mod precision;
 mod rows;
-mod tied;
 
 use nalgebra::DMatrix;
 
@@ -16,12 +16,12 @@ use self::precision::Root;
 use super::commons::{Common, CommonKind};
 
 pub use adjusted::{AdjustedObservation, KindSums};
+pub(super) use assembled::{AssembledObservation, LOCAL, Linear, ModelValues};
 pub use model::{Named, ObservationModel, Quantity, Touches};
 pub(super) use photos::misalignment;
 pub use precision::{Fault, Precision};
 pub(super) use rows::{CommonSite, PhotoSite, PointSite};
 pub use rows::{ObservationInputs, Rows};
-pub(super) use tied::{LOCAL, Linear, TiedModel, TiedObservation};
 
 macro_rules! kinds {
     ($d:tt $($module:ident { $($name:ident = $said:literal, $precision:ident;)* })*) => {

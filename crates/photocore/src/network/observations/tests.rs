@@ -2,12 +2,12 @@
 
 #![allow(clippy::unwrap_used)]
 
+use super::assembled::ModelValues;
 use super::precision::Root;
 use super::rows::{CommonSite, PhotoSite, PointSite};
-use super::tied::TiedModel;
 use super::{
-    Attitude, Common, CommonKind, Control, Difference, Fault, Observation, OnLevel, OnLine, OnPlane,
-    OnPlumbLine, Position, Precision, Quantity, Smoothness, TiedObservation,
+    AssembledObservation, Attitude, Common, CommonKind, Control, Difference, Fault, Observation, OnLevel,
+    OnLine, OnPlane, OnPlumbLine, Position, Precision, Quantity, Smoothness,
 };
 use crate::geometry::film::Pattern;
 use crate::geometry::{
@@ -154,7 +154,7 @@ impl Scene {
     fn equations(&self, observation: &Observation, unknowns: &[f64]) -> (Vec<f64>, Vec<Vec<f64>>) {
         let ((orientations, mounted), states) = (self.orientations(unknowns), self.states(unknowns));
         let (rows, width) = (observation.rows(), unknowns.len());
-        let tied = TiedObservation {
+        let active = AssembledObservation {
             index: 0,
             touches: observation.touches(),
             blocks: (0..BLOCKS + self.commons.len()).collect(),
@@ -169,7 +169,7 @@ impl Scene {
             let made_of = mounted.as_ref().filter(|_| i == 1);
             PhotoSite { orientation: &orientations[i], block: 2 + i, made_of }
         };
-        let model = TiedModel {
+        let model = ModelValues {
             space: self.space,
             origin: [0.0; 3],
             point: &point,
@@ -179,7 +179,7 @@ impl Scene {
             width: &|block| self.of_block(block).len(),
         };
         let (mut constant, mut coefficients) = (vec![0.0; rows], vec![f64::NAN; rows * width]);
-        tied.write(&model, &mut constant, &mut coefficients);
+        active.write(&model, &mut constant, &mut coefficients);
         (constant, coefficients.chunks_exact(width).map(<[f64]>::to_vec).collect())
     }
 }

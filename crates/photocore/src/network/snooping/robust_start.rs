@@ -156,7 +156,7 @@ impl Snooping {
         }
         let expected = MEDIAN_OF_TWO * redundancy.sqrt();
         let mut scale = robust_factor(self.test_values(|group| is_image(&group))).max(1.0);
-        let mut sizes = network.resist(scale)?;
+        let mut sizes = network.robust_residuals(scale)?;
         for _ in 0..SCALES {
             let Some(own) = &sizes else { return Ok(None) };
             let mut of_images: Vec<f64> = images.iter().map(|&group| own[group]).collect();
@@ -165,7 +165,7 @@ impl Snooping {
                 break;
             }
             scale = factor;
-            sizes = network.resist(scale)?;
+            sizes = network.robust_residuals(scale)?;
         }
         Ok(sizes.map(|sizes| (sizes, scale)))
     }

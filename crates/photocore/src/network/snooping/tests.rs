@@ -117,7 +117,7 @@ impl Tried for Linear {
         Ok(self.r().as_slice().to_vec())
     }
 
-    fn resist(&mut self, _: f64) -> Result<Option<Vec<f64>>, NetworkError> {
+    fn robust_residuals(&mut self, _: f64) -> Result<Option<Vec<f64>>, NetworkError> {
         Ok(None)
     }
 }

@@ -35,7 +35,7 @@ pub trait Tried {
 
     /// Adjusts robustly: errors beyond `scale` standard deviations lose weight. Returns the length of the residuals of unit weight of each
     /// group, zero for groups without loss. None if it diverges; then the state is unchanged.
-    fn resist(&mut self, scale: f64) -> Result<Option<Vec<f64>>, NetworkError>;
+    fn robust_residuals(&mut self, scale: f64) -> Result<Option<Vec<f64>>, NetworkError>;
 }
 
 /// A trial with its threads and progress.
@@ -73,13 +73,13 @@ impl Tried for Session<'_> {
         self.trial.responses(&all, self.context.threads)
     }
 
-    fn resist(&mut self, scale: f64) -> Result<Option<Vec<f64>>, NetworkError> {
+    fn robust_residuals(&mut self, scale: f64) -> Result<Option<Vec<f64>>, NetworkError> {
         let huber = Loss::Huber(HUBER * scale);
-        if self.trial.resist(huber, ROBUST_ITERATIONS, &mut self.context)?.is_none() {
+        if self.trial.robust_weights(huber, ROBUST_ITERATIONS, &mut self.context)?.is_none() {
             return Ok(None);
         }
         let limit = CAUCHY * scale;
-        let weights = self.trial.resist(Loss::Cauchy(limit), ROBUST_ITERATIONS, &mut self.context)?;
+        let weights = self.trial.robust_weights(Loss::Cauchy(limit), ROBUST_ITERATIONS, &mut self.context)?;
         // The weight of Cauchy's loss is 1 / (1 + (size / limit)^2).
         let size = |weight: f64| limit * (weight.max(LEAST_WEIGHT).recip() - 1.0).max(0.0).sqrt();
         Ok(weights.map(|weights| weights.into_iter().map(size).collect()))

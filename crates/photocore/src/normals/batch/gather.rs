@@ -2,7 +2,7 @@
 
 use smallvec::{SmallVec, smallvec};
 
-use super::{Batch, Place, TieSums};
+use super::{Batch, Place, TermSums};
 use crate::normals::equations::{Equations, GroupRows, RowBuffer};
 use crate::normals::layout::Layout;
 use crate::normals::system::System;
@@ -12,9 +12,9 @@ impl Batch {
     pub fn gather(&mut self, equations: &dyn Equations, system: &System, units: &[u32]) {
         self.place(system, units);
         self.own.clear();
-        if system.layout.has_local_ties() && !self.uncoupled {
+        if system.layout.has_local_terms() && !self.uncoupled {
             let mut buffer = RowBuffer::default();
-            let of = |&local: &u32| TieSums::of(equations, &system.layout, local as usize, &mut buffer);
+            let of = |&local: &u32| TermSums::of(equations, &system.layout, local as usize, &mut buffer);
             self.own.extend(self.locals.iter().map(of));
         }
         let (rows, l) = (system.layout.rows(), system.layout.local_dim());
@@ -45,13 +45,13 @@ impl Batch {
     }
 }
 
-impl TieSums {
-    /// Forms the normal equations of the ties of a local block.
+impl TermSums {
+    /// Forms the normal equations of the terms of a local block.
     pub fn of(equations: &dyn Equations, layout: &Layout, local: usize, buffer: &mut RowBuffer) -> Self {
         let mut own = Self::default();
-        for &tie in layout.ties_of(local) {
-            let mut rows = buffer.tie(layout, tie as usize);
-            equations.write_tie(tie as usize, &mut rows);
+        for &term in layout.terms_of(local) {
+            let mut rows = buffer.term(layout, term as usize);
+            equations.write_term(term as usize, &mut rows);
             for (row, constant) in rows.local.chunks_exact(layout.local_dim()).zip(&*rows.constant) {
                 for (a, value) in row.iter().enumerate() {
                     own.right[a] += value * constant;

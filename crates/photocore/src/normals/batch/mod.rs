@@ -136,9 +136,9 @@ struct ColumnRun {
     width: usize,
 }
 
-/// Normal equations of the ties of one local block: lower triangle, right-hand side and sum of squares.
+/// Normal equations of the terms of one local block: lower triangle, right-hand side and sum of squares.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct TieSums {
+pub(super) struct TermSums {
     pub normal: [[f64; 3]; 3],
     pub right: [f64; 3],
     pub sum_of_squares: f64,
@@ -175,8 +175,8 @@ pub(super) struct Batch {
     parts: Vec<Part>,
     /// Scratch memory for the unknowns of the spans.
     ranges: Vec<(usize, Range<usize>)>,
-    /// Normal equations of the ties of each local block; empty if no tie is local.
-    own: Vec<TieSums>,
+    /// Normal equations of the terms of each local block; empty if no term is local.
+    own: Vec<TermSums>,
     constants: Vec<f64>,
     local_rows: Vec<f64>,
     retained_rows: Vec<f64>,

@@ -12,8 +12,8 @@ use crate::normals::vectorised::{Kernel, LANES, Rows, add_rows, copy_few, dot, r
 pub(in crate::normals) struct NodeCofactors {
     pub local: Vec<f64>,
     pub equations: Vec<f64>,
-    /// Leverage matrices of the ties at this supernode, in order.
-    pub ties: Vec<f64>,
+    /// Leverage matrices of the terms at this supernode, in order.
+    pub terms: Vec<f64>,
     /// Leverage matrices of groups in the order of the incidence; empty if not requested.
     pub leverages: Vec<f64>,
     /// Computing time in seconds.
@@ -40,7 +40,7 @@ pub(super) struct CoupledInverse {
 
 /// Coefficients of two equations in consecutive unknowns.
 #[derive(Clone, Copy)]
-struct Tied<'a> {
+struct RowPair<'a> {
     /// Index of the first unknown in the coupled unknowns.
     start: usize,
     width: usize,
@@ -48,7 +48,7 @@ struct Tied<'a> {
     x: [&'a [f64]; 2],
 }
 
-impl<'a> Tied<'a> {
+impl<'a> RowPair<'a> {
     #[inline(always)]
     fn coefficients(&self) -> [&'a [f64]; 2] {
         self.x.map(|x| &x[..self.width])
@@ -282,9 +282,9 @@ impl CoupledInverse {
         let local = picked.map(|row| &local[row]);
         let at = (t * main.groups.len() + k) * rows;
         let coefficients = &batch.main_rows::<D>(main, rows).rows.values[at * dim..];
-        let retained = Tied { start, width: dim, x: picked.map(|row| &coefficients[row * dim..]) };
+        let retained = RowPair { start, width: dim, x: picked.map(|row| &coefficients[row * dim..]) };
         let mut form = [[simd.splat_f64s(0.0); 2]; 2];
-        self.tied(simd, &mut form, local, &[], retained);
+        self.add_unknowns(simd, &mut form, local, &[], retained);
         if !batch.parts(p).is_empty() {
             let form = &mut form;
             simd.vectorize(OfShared { simd, others: self, batch, group, picked, local, retained, form });
@@ -309,22 +309,22 @@ impl CoupledInverse {
         Group { t, p, rows, .. }: Group<'_>,
         picked: [usize; 2],
         part: &Part,
-    ) -> Tied<'s> {
+    ) -> RowPair<'s> {
         let Rows { values, width, stride, .. } = batch.part_rows(p, part, t * rows..(t + 1) * rows).rows;
         let start = self.strips[batch.main_blocks.len() + part.span].1 + part.shift;
-        Tied { start, width, x: picked.map(|row| &values[row * stride..]) }
+        RowPair { start, width, x: picked.map(|row| &values[row * stride..]) }
     }
 
     /// Adds the contribution of coefficients x of further unknowns to a Q a^T: (x Q + 2 y Q - 2 a H Q) x^T, in lanes. Here a belongs to the
     /// local unknowns, and y to unknowns added before. The contribution to a Q b^T is the mean of two elements.
     #[inline(always)]
-    fn tied<S: Simd, const L: usize>(
+    fn add_unknowns<S: Simd, const L: usize>(
         &self,
         simd: S,
         form: &mut [[S::f64s; 2]; 2],
         a: [&[f64; L]; 2],
-        before: &[Tied<'_>],
-        own: Tied<'_>,
+        before: &[RowPair<'_>],
+        own: RowPair<'_>,
     ) {
         let (stride, two) = (self.stride, simd.splat_f64s(2.0));
         for first in (0..own.width).step_by(LANES) {
@@ -332,8 +332,8 @@ impl CoupledInverse {
             let rows = |start: usize| &self.inverse[start * stride + column..];
             let [mut local, mut others, mut along] = [[[simd.splat_f64s(0.0); LANES]; 2]; 3];
             add_rows(simd, &mut local, &self.hq[column..], stride, a.map(|a| &a[..]));
-            for tied in before {
-                add_rows(simd, &mut others, rows(tied.start), stride, tied.coefficients());
+            for pair in before {
+                add_rows(simd, &mut others, rows(pair.start), stride, pair.coefficients());
             }
             add_rows(simd, &mut along, rows(own.start), stride, own.coefficients());
             for k in 0..LANES / S::F64_LANES {
@@ -382,7 +382,7 @@ struct OfShared<'a, 'b, S: Simd, const L: usize> {
     group: Group<'b>,
     picked: [usize; 2],
     local: [&'a [f64; L]; 2],
-    retained: Tied<'b>,
+    retained: RowPair<'b>,
     form: &'a mut [[S::f64s; 2]; 2],
 }
 
@@ -395,7 +395,7 @@ impl<S: Simd, const L: usize> NullaryFnOnce for OfShared<'_, '_, S, L> {
         let mut before: SmallVec<[_; 4]> = smallvec![retained];
         for part in batch.parts(group.p) {
             let shared = others.shared(batch, group, picked, part);
-            others.tied(simd, form, local, &before, shared);
+            others.add_unknowns(simd, form, local, &before, shared);
             before.push(shared);
         }
     }

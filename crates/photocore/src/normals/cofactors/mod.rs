@@ -24,11 +24,11 @@ pub struct Cofactors {
     pub local: Vec<f64>,
     /// Blocks of the retained blocks, one after the other.
     pub retained: Vec<f64>,
-    /// Leverage a Q a^T of each equation a x = l, in the order of groups and rows, then of ties and rows. One minus the leverage is the
+    /// Leverage a Q a^T of each equation a x = l, in the order of groups and rows, then of terms and rows. One minus the leverage is the
     /// redundancy number of an observation.
     pub equations: Vec<f64>,
-    /// Leverage matrices a Q a^T of ties, square blocks row by row, one after the other.
-    pub ties: Vec<f64>,
+    /// Leverage matrices a Q a^T of terms, square blocks row by row, one after the other.
+    pub terms: Vec<f64>,
     /// Blocks of the requested pairs of retained blocks, one after the other.
     pub pairs: Vec<f64>,
     /// Leverage matrices a Q a^T of all pairs of equations in each group, row by row, if requested. The identity minus this matrix is the
@@ -67,23 +67,23 @@ impl Cofactors {
                 }
             }
         }
-        let mut ties = control.allocated(zeros(layout.tie_blocks().end))?;
+        let mut terms = control.allocated(zeros(layout.term_blocks().end))?;
         let mut put = |order: &mut dyn Iterator<Item = usize>, mut values: &[f64]| {
-            for tie in order {
-                let (own, rest) = values.split_at(layout.tie_block(tie).len());
-                ties[layout.tie_block(tie)].copy_from_slice(own);
-                let diagonal = own.iter().step_by(layout.ties()[tie].rows + 1);
-                let target = leverages[layout.equations_of_tie(tie)].iter_mut();
+            for term in order {
+                let (own, rest) = values.split_at(layout.term_block(term).len());
+                terms[layout.term_block(term)].copy_from_slice(own);
+                let diagonal = own.iter().step_by(layout.terms()[term].rows + 1);
+                let target = leverages[layout.equations_of_term(term)].iter_mut();
                 target.zip(diagonal).for_each(|(to, &leverage)| *to = leverage);
                 values = rest;
             }
         };
         for (index, at_node) in found.iter().enumerate() {
-            put(&mut system.ties.at(index).iter().map(|&tie| tie as usize), &at_node.ties);
+            put(&mut system.terms.at(index).iter().map(|&term| term as usize), &at_node.terms);
         }
-        let of_locals = (0..layout.ties().len()).filter(|&tie| layout.ties()[tie].local.is_some());
-        put(&mut { of_locals }, &leverages_of_local_ties(layout, equations, &local));
-        Some(Self { local, retained, equations: leverages, ties, pairs, groups: None, information })
+        let of_locals = (0..layout.terms().len()).filter(|&term| layout.terms()[term].local.is_some());
+        put(&mut { of_locals }, &leverages_of_local_terms(layout, equations, &local));
+        Some(Self { local, retained, equations: leverages, terms, pairs, groups: None, information })
     }
 }
 
@@ -147,22 +147,22 @@ impl NodeCofactors {
                 all
             })
         };
-        found.ties = ties_at_node(system, index, equations, front, height);
+        found.terms = terms_at_node(system, index, equations, front, height);
         found.seconds = start.elapsed().as_secs_f64();
         found
     }
 }
 
-/// Computes a Q a^T of the equations of each tie of a local block, one square block per tie; `cofactors` are those of the local blocks.
-fn leverages_of_local_ties(layout: &Layout, equations: &dyn Equations, cofactors: &[f64]) -> Vec<f64> {
+/// Computes a Q a^T of the equations of each term of a local block, one square block per term; `cofactors` are those of the local blocks.
+fn leverages_of_local_terms(layout: &Layout, equations: &dyn Equations, cofactors: &[f64]) -> Vec<f64> {
     let l = layout.local_dim();
-    let part = |ties: Range<usize>| {
+    let part = |terms: Range<usize>| {
         let (mut buffer, mut found) = (RowBuffer::default(), Vec::new());
-        for tie in ties {
-            let Some(local) = layout.ties()[tie].local else { continue };
+        for term in terms {
+            let Some(local) = layout.terms()[term].local else { continue };
             let q = &cofactors[local as usize * l * l..][..l * l];
-            let mut rows = buffer.tie(layout, tie);
-            equations.write_tie(tie, &mut rows);
+            let mut rows = buffer.term(layout, term);
+            equations.write_term(term, &mut rows);
             for own in rows.local.chunks_exact(l) {
                 let mut product = [0.0; 3];
                 product.iter_mut().zip(q.chunks_exact(l)).for_each(|(sum, row)| *sum = dot(row, own));
@@ -171,12 +171,12 @@ fn leverages_of_local_ties(layout: &Layout, equations: &dyn Equations, cofactors
         }
         found
     };
-    let count = if layout.has_local_ties() { layout.ties().len() } else { 0 };
+    let count = if layout.has_local_terms() { layout.terms().len() } else { 0 };
     parallel::by_parts(count, MANY, &part)
 }
 
-/// Computes a Q a^T of the equations of each tie at a supernode, one square block per tie.
-fn ties_at_node(
+/// Computes a Q a^T of the equations of each term at a supernode, one square block per term.
+fn terms_at_node(
     system: &System,
     index: usize,
     equations: &dyn Equations,
@@ -184,10 +184,10 @@ fn ties_at_node(
     height: usize,
 ) -> Vec<f64> {
     let (mut buffer, mut found) = (RowBuffer::default(), Vec::new());
-    for &tie in system.ties.at(index) {
-        let (columns, rows) = system.tie_in_front(index, equations, tie as usize, &mut buffer);
+    for &term in system.terms.at(index) {
+        let (columns, rows) = system.term_in_front(index, equations, term as usize, &mut buffer);
         for (own, _) in &rows {
-            // a Q for the columns of the tie.
+            // a Q for the columns of the term.
             let by_column = |&column: &usize| {
                 columns.iter().zip(own).map(|(&row, value)| front[column * height + row] * value).sum::<f64>()
             };

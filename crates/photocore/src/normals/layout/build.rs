@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use super::{Layout, LayoutError, Tie};
+use super::{Layout, LayoutError, Term};
 
 impl Layout {
     /// Describes a system without shared blocks.
@@ -52,11 +52,11 @@ impl Layout {
             group_retained,
             shared_ptr: Vec::new(),
             shared: Vec::new(),
-            ties: Vec::new(),
-            tie_ptr: vec![0],
+            terms: Vec::new(),
+            term_ptr: vec![0],
             block_ptr: vec![0],
-            local_tie_ptr: Vec::new(),
-            local_ties: Vec::new(),
+            local_term_ptr: Vec::new(),
+            local_terms: Vec::new(),
             places: None,
             free: Vec::new(),
             uncoupled: Vec::new(),
@@ -98,43 +98,44 @@ impl Layout {
         Ok(self)
     }
 
-    /// Adds ties.
-    pub fn with_ties(mut self, ties: Vec<Tie>) -> Result<Self, LayoutError> {
-        numbered(ties.len())?;
-        let sound = |tie: &Tie| {
-            let mut retained = tie.retained.clone();
+    /// Adds terms.
+    pub fn with_terms(mut self, terms: Vec<Term>) -> Result<Self, LayoutError> {
+        numbered(terms.len())?;
+        let sound = |term: &Term| {
+            let mut retained = term.retained.clone();
             retained.sort_unstable();
-            let exist = match (tie.local, retained.last()) {
+            let exist = match (term.local, retained.last()) {
                 (None, Some(&last)) => (last as usize) < self.retained(),
                 (Some(local), None) => (local as usize) < self.locals,
                 _ => false,
             };
             let once = retained.windows(2).all(|pair| pair[0] < pair[1]);
-            tie.rows > 0 && exist && once
+            term.rows > 0 && exist && once
         };
-        if let Some(tie) = ties.iter().position(|tie| !sound(tie)) {
-            return Err(LayoutError::Tie { tie });
+        if let Some(term) = terms.iter().position(|term| !sound(term)) {
+            return Err(LayoutError::Term { term });
         }
-        self.tie_ptr.truncate(1);
+        self.term_ptr.truncate(1);
         self.block_ptr.truncate(1);
-        for tie in &ties {
-            self.tie_ptr.push(self.tie_ptr[self.tie_ptr.len() - 1] + tie.rows);
-            self.block_ptr.push(self.block_ptr[self.block_ptr.len() - 1] + tie.rows.pow(2));
+        for term in &terms {
+            self.term_ptr.push(self.term_ptr[self.term_ptr.len() - 1] + term.rows);
+            self.block_ptr.push(self.block_ptr[self.block_ptr.len() - 1] + term.rows.pow(2));
         }
-        let of_locals = || ties.iter().zip(0..).filter_map(|(tie, index)| Some((tie.local? as usize, index)));
-        (self.local_tie_ptr, self.local_ties) = (Vec::new(), Vec::new());
+        let of_locals =
+            || terms.iter().zip(0..).filter_map(|(term, index)| Some((term.local? as usize, index)));
+        (self.local_term_ptr, self.local_terms) = (Vec::new(), Vec::new());
         if of_locals().next().is_some() {
             let mut ptr = vec![0; self.locals + 1];
             of_locals().for_each(|(local, _)| ptr[local + 1] += 1);
             (0..self.locals).for_each(|local| ptr[local + 1] += ptr[local]);
             let (mut next, mut sorted) = (ptr.clone(), vec![0; ptr[self.locals]]);
-            for (local, tie) in of_locals() {
-                sorted[next[local]] = tie;
+            for (local, term) in of_locals() {
+                sorted[next[local]] = term;
                 next[local] += 1;
             }
-            (self.local_tie_ptr, self.local_ties) = (ptr, sorted);
+            (self.local_term_ptr, self.local_terms) = (ptr, sorted);
         }
-        self.ties = ties;
+        self.terms = terms;
         Ok(self)
     }
 

@@ -11,12 +11,12 @@ use thiserror::Error;
 ///
 /// The vector of unknowns is `[local blocks | retained blocks]`. A group of `rows` equations involves one local block, one main retained
 /// block and optional *shared* retained blocks, such as the camera of several photos. The groups of a local block are consecutive. A
-/// [`Tie`] involves any retained blocks, or one local block.
+/// [`Term`] involves any retained blocks, or one local block.
 ///
 /// Kernels are specialised for main blocks. A retained block is either main or shared, never both; blocks that most groups involve should
 /// be shared.
 ///
-/// The numbers of blocks, groups, ties and unknowns are less than `u32::MAX` each, which is checked here. Indices have 32 bits.
+/// The numbers of blocks, groups, terms and unknowns are less than `u32::MAX` each, which is checked here. Indices have 32 bits.
 #[derive(Debug, Clone)]
 pub struct Layout {
     rows: usize,
@@ -28,14 +28,14 @@ pub struct Layout {
     /// The shared blocks of group `g` are `shared[shared_ptr[g]..shared_ptr[g + 1]]`; both vectors are empty if no group has any.
     shared_ptr: Vec<usize>,
     shared: Vec<u32>,
-    ties: Vec<Tie>,
-    /// Index of the first equation of each tie among all ties, and the end of the last.
-    tie_ptr: Vec<usize>,
-    /// Offset of the square matrix of each tie, and the end of the last.
+    terms: Vec<Term>,
+    /// Index of the first equation of each term among all terms, and the end of the last.
+    term_ptr: Vec<usize>,
+    /// Offset of the square matrix of each term, and the end of the last.
     block_ptr: Vec<usize>,
-    /// The ties of local block `i` are `local_ties[local_tie_ptr[i]..local_tie_ptr[i + 1]]`; both vectors are empty if no tie is local.
-    local_tie_ptr: Vec<usize>,
-    local_ties: Vec<u32>,
+    /// The terms of local block `i` are `local_terms[local_term_ptr[i]..local_term_ptr[i + 1]]`; both vectors are empty if no term is local.
+    local_term_ptr: Vec<usize>,
+    local_terms: Vec<u32>,
     places: Option<Vec<[f64; 3]>>,
     /// Index ranges of the free unknowns of each retained block; empty if every unknown is free.
     free: Vec<Vec<Range<usize>>>,
@@ -52,7 +52,7 @@ pub struct Layout {
 /// Equations among retained blocks, such as a distance between two retained points or a relative pose of two photos; or equations of one
 /// local block, such as a height of a point. The latter are part of the elimination of the block.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Tie {
+pub struct Term {
     /// Number of equations.
     pub rows: usize,
     /// The local block of equations without retained blocks.
@@ -64,7 +64,7 @@ pub struct Tie {
 /// Inconsistent layout.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 pub enum LayoutError {
-    /// More blocks, groups, ties or unknowns than 32-bit indices.
+    /// More blocks, groups, terms or unknowns than 32-bit indices.
     #[error("{0} blocks, equations or unknowns are more than can be numbered")]
     TooMany(usize),
     /// A local block must have 1 to 3 unknowns.
@@ -151,13 +151,13 @@ pub enum LayoutError {
         /// Supernode of the front.
         front: usize,
     },
-    /// A tie has zero equations or unknowns, refers to a missing or duplicate block, or to a local block and others.
+    /// A term has zero equations or unknowns, refers to a missing or duplicate block, or to a local block and others.
     #[error(
-        "tie {tie} has no equations or unknowns, or names a block twice or one that does not exist, or has a local block and others"
+        "tie {term} has no equations or unknowns, or names a block twice or one that does not exist, or has a local block and others"
     )]
-    Tie {
-        /// Index of the tie.
-        tie: usize,
+    Term {
+        /// Index of the term.
+        term: usize,
     },
 }
 
@@ -244,9 +244,9 @@ impl Layout {
         self.group_retained.len()
     }
 
-    /// The ties.
-    pub fn ties(&self) -> &[Tie] {
-        &self.ties
+    /// The terms.
+    pub fn terms(&self) -> &[Term] {
+        &self.terms
     }
 
     /// Returns the equations of a group.
@@ -254,50 +254,50 @@ impl Layout {
         group * self.rows..(group + 1) * self.rows
     }
 
-    /// Returns the equations of a tie, which follow those of the groups.
-    pub fn equations_of_tie(&self, tie: usize) -> Range<usize> {
+    /// Returns the equations of a term, which follow those of the groups.
+    pub fn equations_of_term(&self, term: usize) -> Range<usize> {
         let first = self.groups() * self.rows;
-        first + self.tie_ptr[tie]..first + self.tie_ptr[tie + 1]
+        first + self.term_ptr[term]..first + self.term_ptr[term + 1]
     }
 
-    /// Returns the tie of an equation; None for those of groups.
-    pub fn tie_with(&self, equation: usize) -> Option<usize> {
+    /// Returns the term of an equation; None for those of groups.
+    pub fn term_with(&self, equation: usize) -> Option<usize> {
         let row = equation.checked_sub(self.groups() * self.rows)?;
-        Some(self.tie_ptr.partition_point(|&first| first <= row) - 1)
+        Some(self.term_ptr.partition_point(|&first| first <= row) - 1)
     }
 
-    /// Returns the range of the square matrix of a tie among the matrices of all ties.
-    pub fn tie_block(&self, tie: usize) -> Range<usize> {
-        self.block_ptr[tie]..self.block_ptr[tie + 1]
+    /// Returns the range of the square matrix of a term among the matrices of all terms.
+    pub fn term_block(&self, term: usize) -> Range<usize> {
+        self.block_ptr[term]..self.block_ptr[term + 1]
     }
 
-    /// Returns the range of the square matrices of all ties.
-    pub fn tie_blocks(&self) -> Range<usize> {
-        0..self.block_ptr[self.ties.len()]
+    /// Returns the range of the square matrices of all terms.
+    pub fn term_blocks(&self) -> Range<usize> {
+        0..self.block_ptr[self.terms.len()]
     }
 
-    /// Number of equations: all groups, then all ties.
+    /// Number of equations: all groups, then all terms.
     pub fn equations(&self) -> usize {
-        self.groups() * self.rows + self.tie_ptr[self.ties.len()]
+        self.groups() * self.rows + self.term_ptr[self.terms.len()]
     }
 
-    /// Returns the unknowns of a tie, block by block: the columns of its coefficients.
-    pub fn tie_columns(&self, tie: usize) -> impl Iterator<Item = usize> + '_ {
-        let Tie { local, retained, .. } = &self.ties[tie];
+    /// Returns the unknowns of a term, block by block: the columns of its coefficients.
+    pub fn term_columns(&self, term: usize) -> impl Iterator<Item = usize> + '_ {
+        let Term { local, retained, .. } = &self.terms[term];
         local.map_or(0..0, |local| self.local_range(local as usize)).chain(self.unknowns_of(retained))
     }
 
-    /// Returns the ties of a local block.
-    pub fn ties_of(&self, local: usize) -> &[u32] {
-        match self.local_tie_ptr.get(local..local + 2) {
-            Some(ends) => &self.local_ties[ends[0]..ends[1]],
+    /// Returns the terms of a local block.
+    pub fn terms_of(&self, local: usize) -> &[u32] {
+        match self.local_term_ptr.get(local..local + 2) {
+            Some(ends) => &self.local_terms[ends[0]..ends[1]],
             None => &[],
         }
     }
 
-    /// Whether any tie belongs to a local block.
-    pub(super) fn has_local_ties(&self) -> bool {
-        !self.local_ties.is_empty()
+    /// Whether any term belongs to a local block.
+    pub(super) fn has_local_terms(&self) -> bool {
+        !self.local_terms.is_empty()
     }
 
     /// Number of unknowns.

@@ -2,9 +2,9 @@
 
 use std::ops::Range;
 
-/// Prior terms at given values, ascending: terms of the model ([`super::Model::terms`]), and one term per other weighted unknown.
+/// Prior terms at given values, ascending: terms of the model ([`super::Model::prior_terms`]), and one term per other weighted unknown.
 #[derive(Debug, Default)]
-pub struct Terms {
+pub struct PriorTerms {
     places: Vec<Place>,
     constants: Vec<f64>,
     coefficients: Vec<f64>,
@@ -27,7 +27,7 @@ impl Place {
 
 /// Prior of consecutive unknowns of one block: one equation per unknown.
 #[derive(Debug, Clone, Copy)]
-pub struct Term<'a> {
+pub struct PriorTerm<'a> {
     /// Index of the first unknown.
     pub first: usize,
     /// Observed minus computed, one element per unknown.
@@ -36,7 +36,7 @@ pub struct Term<'a> {
     pub coefficients: &'a [f64],
 }
 
-impl<'a> Term<'a> {
+impl<'a> PriorTerm<'a> {
     /// Range of the unknowns.
     pub fn unknowns(&self) -> Range<usize> {
         self.first..self.first + self.constant.len()
@@ -48,7 +48,7 @@ impl<'a> Term<'a> {
     }
 }
 
-impl Terms {
+impl PriorTerms {
     /// Adds terms of the other weighted unknowns to those of a model at given values; `prior` and `sd` are observed values and standard
     /// deviations of the unknowns.
     pub fn new(of_model: Self, values: &[f64], prior: &[f64], sd: &[f64]) -> Self {
@@ -80,9 +80,9 @@ impl Terms {
         self.places.sort_by_key(|own| own.first);
     }
 
-    fn term(&self, place: &Place) -> Term<'_> {
+    fn term(&self, place: &Place) -> PriorTerm<'_> {
         let width = place.width as usize;
-        Term {
+        PriorTerm {
             first: place.first as usize,
             constant: &self.constants[place.constants..][..width],
             coefficients: &self.coefficients[place.coefficients..][..width * width],
@@ -90,7 +90,7 @@ impl Terms {
     }
 
     /// Returns the terms whose first unknown is in a range, ascending.
-    pub fn within(&self, of: Range<usize>) -> impl Iterator<Item = Term<'_>> {
+    pub fn within(&self, of: Range<usize>) -> impl Iterator<Item = PriorTerm<'_>> {
         let before = |end: usize| self.places.partition_point(|own| (own.first as usize) < end);
         self.places[before(of.start)..before(of.end)].iter().map(|place| self.term(place))
     }

@@ -7,7 +7,7 @@ use photocore::adjustment::{
     Datum, DatumError, Evaluated, Leverages, Linearized, Loss, Method, Model, Motions, Options, Problem,
     Published, Status, Stop, adjust,
 };
-use photocore::normals::{GroupRows, Layout, Ordering, System, Tie};
+use photocore::normals::{GroupRows, Layout, Ordering, System, Term};
 use photocore::{Context, Threads};
 
 use crate::scatter;
@@ -45,11 +45,11 @@ impl Evaluated for At<'_> {
         rows.retained.copy_from_slice(&partials.map(|value| -value));
     }
 
-    fn observe_tie(&self, tie: usize, rows: &mut GroupRows<'_>) {
+    fn observe_term(&self, term: usize, rows: &mut GroupRows<'_>) {
         let (net, layout) = (self.net, &self.net.layout);
-        let retained = &layout.ties()[tie].retained;
+        let retained = &layout.terms()[term].retained;
         let [from, to] = [0, 1].map(|end| layout.retained_range(retained[end] as usize).start);
-        let (left, partials) = net.distance(&self.values, layout.groups() + tie, from, to);
+        let (left, partials) = net.distance(&self.values, layout.groups() + term, from, to);
         rows.constant[0] = left;
         rows.shared[..2].copy_from_slice(&partials);
         rows.shared[2..].copy_from_slice(&partials.map(|value| -value));
@@ -89,14 +89,14 @@ fn network(held: Vec<usize>) -> Problem<Trilateration> {
     }
     let pairs: Vec<[u32; 2]> =
         (0..12).flat_map(|k| [[k, (k + 1) % 12], [k, (k + 4) % 12], [(k + 5) % 12, k]]).collect();
-    let ties = pairs.iter().map(|pair| Tie { rows: 1, local: None, retained: pair.to_vec() }).collect();
-    let layout = Layout::new(1, 2, &[2; 12], ptr.clone(), seen.clone()).unwrap().with_ties(ties).unwrap();
+    let terms = pairs.iter().map(|pair| Term { rows: 1, local: None, retained: pair.to_vec() }).collect();
+    let layout = Layout::new(1, 2, &[2; 12], ptr.clone(), seen.clone()).unwrap().with_terms(terms).unwrap();
     let truth: Vec<f64> = local.iter().chain(&retained).flatten().copied().collect();
     let distance = |a: usize, b: usize| (truth[a] - truth[b]).hypot(truth[a + 1] - truth[b + 1]);
     let of_groups = (0..seen.len()).map(|g| distance(g / 4 * 2, 16 + 2 * seen[g] as usize));
-    let of_ties = pairs.iter().map(|pair| distance(16 + 2 * pair[0] as usize, 16 + 2 * pair[1] as usize));
+    let of_terms = pairs.iter().map(|pair| distance(16 + 2 * pair[0] as usize, 16 + 2 * pair[1] as usize));
     let lengths: Vec<f64> =
-        of_groups.chain(of_ties).enumerate().map(|(i, length)| length + SD * scatter(100 + i)).collect();
+        of_groups.chain(of_terms).enumerate().map(|(i, length)| length + SD * scatter(100 + i)).collect();
     let initial: Vec<f64> = truth.iter().enumerate().map(|(i, x)| x + 0.5 * scatter(500 + i)).collect();
     let unknowns = layout.unknowns();
     Problem {
@@ -124,9 +124,9 @@ fn design(problem: &Problem<Trilateration>, values: &[f64]) -> Mat<f64> {
     let ends = (0..layout.groups())
         .map(|g| [layout.local_range(g / 4).start, layout.retained_range(layout.retained_of(g)).start]);
     let tied = layout
-        .ties()
+        .terms()
         .iter()
-        .map(|tie| [0, 1].map(|end| layout.retained_range(tie.retained[end] as usize).start));
+        .map(|term| [0, 1].map(|end| layout.retained_range(term.retained[end] as usize).start));
     for (row, [from, to]) in ends.chain(tied).enumerate() {
         let (_, partials) = problem.model.distance(values, row, from, to);
         for k in 0..2 {
@@ -298,7 +298,7 @@ fn what_is_open_is_found_by_trying_and_held() {
 }
 
 #[test]
-fn a_loss_takes_the_weight_of_a_wrong_tie() {
+fn a_loss_takes_the_weight_of_a_wrong_term() {
     let mut problem = network(vec![16, 17, 19]);
     let wrong = problem.layout().groups() + 5;
     problem.model.lengths[wrong] += 3.0;
@@ -352,7 +352,7 @@ fn excluded_observations_may_not_be_finite() {
 }
 
 #[test]
-fn equations_of_ties_have_the_cofactors_of_solutions() {
+fn equations_of_terms_have_the_cofactors_of_solutions() {
     let (problem, threads) = (network(vec![]), threads());
     let adjusted = adjust(&problem, &Options::default(), &mut Context::new(&threads)).unwrap();
     let (values, held) = (adjusted.unknowns, adjusted.datum);
@@ -360,8 +360,8 @@ fn equations_of_ties_have_the_cofactors_of_solutions() {
         Leverages::at(&problem, values.clone(), held.clone(), &mut Context::new(&threads)).unwrap();
     let linearized = Linearized::form(&problem, None, values, held, &mut Context::new(&threads)).unwrap();
     let layout = problem.layout();
-    let ties: Vec<usize> = (0..layout.ties().len()).collect();
-    for rows in leverages.rows_of_ties(&problem, &problem.observation_sd, &ties, &threads) {
+    let terms: Vec<usize> = (0..layout.terms().len()).collect();
+    for rows in leverages.rows_of_terms(&problem, &problem.observation_sd, &terms, &threads) {
         let dense = |row: &Vec<(usize, f64)>| {
             let mut dense = vec![0.0; layout.unknowns()];
             row.iter().for_each(|&(unknown, value)| dense[unknown] = value);

@@ -1,4 +1,4 @@
-//! Active observation: a whitened tie.
+//! Active observation: a whitened term.
 
 use nalgebra::{DMatrix, DVector};
 use smallvec::SmallVec;
@@ -11,7 +11,7 @@ use crate::normals::GroupRows;
 
 /// An observation of points, photos and shared parameters of a model.
 #[derive(Debug)]
-pub struct TiedObservation {
+pub struct AssembledObservation {
     pub index: usize,
     pub observation: Observation,
     /// Objects of the observation, with points as numbered in the model.
@@ -44,7 +44,7 @@ impl Linear {
 }
 
 /// A model at given parameter values.
-pub struct TiedModel<'a> {
+pub struct ModelValues<'a> {
     pub space: ObjectSpace,
     pub origin: [f64; 3],
     pub point: &'a dyn Fn(usize) -> PointSite,
@@ -56,17 +56,17 @@ pub struct TiedModel<'a> {
     pub width: &'a dyn Fn(usize) -> usize,
 }
 
-/// Block of a local point in [`TiedObservation::blocks`].
+/// Block of a local point in [`AssembledObservation::blocks`].
 pub const LOCAL: usize = usize::MAX;
 
-impl TiedObservation {
+impl AssembledObservation {
     /// Returns the local point of an observation of this point alone.
     pub fn local(&self) -> Option<usize> {
         self.touches.points.first().copied().filter(|_| self.blocks == [LOCAL])
     }
 
     /// Writes L^-1 (observed - computed) and L^-1 times the partials, in columns block by block.
-    pub fn write(&self, model: &TiedModel<'_>, constant: &mut [f64], coefficients: &mut [f64]) {
+    pub fn write(&self, model: &ModelValues<'_>, constant: &mut [f64], coefficients: &mut [f64]) {
         let inputs = self.inputs(model);
         let mut width = 0;
         let column = |&block: &usize| {
@@ -87,7 +87,7 @@ impl TiedObservation {
     /// axes E. None if it is not a displacement.
     pub fn carried<const N: usize>(
         &self,
-        model: &TiedModel<'_>,
+        model: &ModelValues<'_>,
         motions: impl Fn(&Vector3) -> [Vector3; N],
     ) -> Option<Vec<[f64; N]>> {
         let axes = self.observation.axes(&self.inputs(model))?;
@@ -103,7 +103,7 @@ impl TiedObservation {
         Some(found)
     }
 
-    fn inputs<'a>(&self, model: &TiedModel<'a>) -> ObservationInputs<'a> {
+    fn inputs<'a>(&self, model: &ModelValues<'a>) -> ObservationInputs<'a> {
         ObservationInputs {
             space: model.space,
             origin: model.origin,
