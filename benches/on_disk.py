@@ -27,9 +27,10 @@ from photogram.distributed import Division
 from photogram.distributed.division import bytes_of
 from photogram.distributed.executors import connected
 from photogram.formats import ReadOptions, to_files
-from photogram.formats.in_parts import adjusted_on_disk, planned_on_disk
+from photogram.formats.in_parts import document, on_disk
 from photogram.formats.project import Project
 from photogram.network.block import Block
+from photogram.show.forms import text
 
 ROWS = 2**20
 """Of the table of images, written together."""
@@ -78,37 +79,38 @@ def _without_images(block: Block, folder: Path) -> Project:
     return Project(block=held, path=folder, title="", sizes=none, pixel_mm=none, starts=starts)
 
 
-def on_disk(folder: Path) -> float:
+def size_on_disk(folder: Path) -> float:
     """Return GiB of all files of a folder."""
     return sum(path.stat().st_size for path in folder.rglob("*") if path.is_file()) / 2**30
 
 
-def told(start: float) -> Callable[[Progress], None]:
-    """Return what tells of each iteration."""
+def progress_since(start: float) -> Callable[[Progress], None]:
+    """Return a callback that prints each iteration."""
 
-    def tell(progress: Progress) -> None:
+    def print_iteration(progress: Progress) -> None:
         if progress.iteration is not None:
             done = progress.iteration.number, time.perf_counter() - start
             print(f"iteration {done[0]} after {done[1]:,.0f} s", file=sys.stderr, flush=True)
 
-    return tell
+    return print_iteration
 
 
-def carried_out(project: Path, run: Path, workers: int, parts: int, memory: str) -> None:
-    """Adjust a project; print the plan, what came of it and what it took."""
-    print(f"the project takes {on_disk(project):.2f} GiB on disk", flush=True)
+def adjust_in_parts(project: Path, run: Path, workers: int, parts: int, memory: str) -> None:
+    """Adjust a project; print the plan, the result, and its time and memory."""
+    print(f"the project takes {size_on_disk(project):.2f} GiB on disk", flush=True)
     with connected("local", workers, bytes_of(memory)) as client:
         division = Division(cluster=client, parts=parts, memory=memory)
         start = time.perf_counter()
-        plan = planned_on_disk(project, ReadOptions(), run, division)
-        print(f"divided and planned in {time.perf_counter() - start:,.0f} s")
-        print(plan.report(), flush=True)
-        start = time.perf_counter()
-        found = adjusted_on_disk(project, ReadOptions(), run, division, progress=told(start))
-        seconds = time.perf_counter() - start
+        with on_disk(project, ReadOptions(), run, division) as opened:
+            plan = opened.plan()
+            print(f"divided and planned in {time.perf_counter() - start:,.0f} s")
+            print(text(plan.document()), flush=True)
+            start = time.perf_counter()
+            outcome = opened.adjust(progress_since(start))
+            seconds = time.perf_counter() - start
+            print(text(document(opened, outcome)))
         peaks = client.run(peak_memory)
-    print(found.report())
-    print(f"adjusted in {seconds:,.0f} s; parts, states and results take {on_disk(run):.2f} GiB on disk")
+    print(f"adjusted in {seconds:,.0f} s; parts, states and results take {size_on_disk(run):.2f} GiB on disk")
     for _, peak in sorted(peaks.items()):
         print(f"peak of a worker {peak / 2**20:,.0f} MiB")
     print(f"peak of this process {peak_memory() / 2**20:,.0f} MiB")
@@ -133,7 +135,7 @@ def main() -> None:
         if not project.exists():
             own = [sys.executable, __file__, given.size, "--project-only", "--folder", str(project)]
             subprocess.run(own, check=True)
-        carried_out(project, folder / "run", given.workers, given.parts, given.memory)
+        adjust_in_parts(project, folder / "run", given.workers, given.parts, given.memory)
 
 
 if __name__ == "__main__":

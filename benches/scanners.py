@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from on_disk import on_disk, told
+from on_disk import progress_since, size_on_disk
 from peak import forget_peak, peak_memory
 from photogram import Block, Camera, adjust
 from photogram.adjustment.adjustment import core_options
@@ -31,11 +31,12 @@ from photogram.distributed.adjust import opened
 from photogram.distributed.division import bytes_of
 from photogram.distributed.executors import connected
 from photogram.distributed.run import MANIFEST, partition
-from photogram.formats.in_parts import OnDisk
+from photogram.formats.in_parts import document
 from photogram.memory import give_back, resident_memory
 from photogram.network.attitudes import Attitudes
 from photogram.network.moving_photos import Lines, LineSensor, Timed
 from photogram.network.trajectories import Polynomial, Table, Trajectory
+from photogram.show.forms import text
 
 ALTITUDE, SPEED, APART, LENGTH = 100e3, 1.6e3, 10e3, 35e3
 """Metres above the ground and in a second, between orbits, and of ground that an image covers along one."""
@@ -173,7 +174,7 @@ def in_parts(images: int, parts: int, workers: int, memory: str, run: Path) -> N
         own = [sys.executable, __file__, str(images), "--divide", "--parts", str(parts), "--folder", str(run)]
         subprocess.run(own, check=True)
         print(
-            f"simulated and divided in {time.perf_counter() - start:,.0f} s, {on_disk(run):.2f} GiB on disk"
+            f"simulated and divided in {time.perf_counter() - start:,.0f} s, {size_on_disk(run):.2f} GiB on disk"
         )
 
     def divided(_: int) -> Any:
@@ -186,11 +187,11 @@ def in_parts(images: int, parts: int, workers: int, memory: str, run: Path) -> N
             print(own_run.plan().report())
             print(f"planned in {time.perf_counter() - start:,.0f} s", flush=True)
             start = time.perf_counter()
-            outcome = own_run.adjust(told(start))
+            outcome = own_run.adjust(progress_since(start))
             seconds = time.perf_counter() - start
-            print(OnDisk(outcome, own_run.manifest, []).report())
+            print(text(document(own_run, outcome)))
         peaks, processors = client.run(peak_memory), client.run(time.process_time)
-    print(f"adjusted in {seconds:,.0f} s; parts, states and results take {on_disk(run):.2f} GiB on disk")
+    print(f"adjusted in {seconds:,.0f} s; parts, states and results take {size_on_disk(run):.2f} GiB on disk")
     for worker, peak in sorted(peaks.items()):
         print(f"peak of a worker {peak / 2**20:,.0f} MiB, {processors[worker]:,.0f} s of a processor")
     print(f"peak of this process {peak_memory() / 2**20:,.0f} MiB")

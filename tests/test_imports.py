@@ -1,9 +1,11 @@
 """Every way to import works by itself, in a new process."""
 
+import ast
 import inspect
 import subprocess
 import sys
 from importlib import import_module
+from importlib.util import find_spec
 from inspect import signature
 from pathlib import Path
 from pkgutil import resolve_name
@@ -12,6 +14,8 @@ import pytest
 
 import photogram
 import public_api
+
+BENCHES = sorted((Path(__file__).parents[1] / "benches").glob("*.py"))
 
 
 @pytest.mark.parametrize(
@@ -115,3 +119,12 @@ def test_what_is_called_finds_what_it_needs(program):
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()
+
+
+@pytest.mark.parametrize("bench", BENCHES, ids=lambda path: path.stem)
+def test_names_that_a_benchmark_imports_exist(bench):
+    for node in ast.walk(ast.parse(bench.read_text())):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").partition(".")[0] == "photogram":
+            home = import_module(node.module or "")
+            for name in (each.name for each in node.names):
+                assert hasattr(home, name) or find_spec(f"{node.module}.{name}"), f"{node.module}.{name}"
