@@ -173,9 +173,8 @@ def in_parts(images: int, parts: int, workers: int, memory: str, run: Path) -> N
     if not (run / MANIFEST).exists():
         own = [sys.executable, __file__, str(images), "--divide", "--parts", str(parts), "--folder", str(run)]
         subprocess.run(own, check=True)
-        print(
-            f"simulated and divided in {time.perf_counter() - start:,.0f} s, {size_on_disk(run):.2f} GiB on disk"
-        )
+        seconds = time.perf_counter() - start
+        print(f"simulated and divided in {seconds:,.0f} s, {size_on_disk(run):.2f} GiB on disk")
 
     def divided(_: int) -> Any:
         raise AssertionError("the parts lie in the folder")
