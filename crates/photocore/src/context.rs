@@ -54,6 +54,25 @@ pub enum Event {
 /// Threads of long work, and its progress callback, which can stop it.
 ///
 /// The callback is called on the calling thread with every iteration, before each phase and every 40 ms during it. `Break` stops the work.
+///
+/// ```
+/// use std::ops::ControlFlow;
+///
+/// use photocore::network::{Network, Options};
+/// use photocore::{Context, Event, Threads};
+///
+/// let threads = Threads::new(1)?;
+/// let mut report = |event| {
+///     if let Event::Iteration(iteration) = event {
+///         println!("iteration {}: {}", iteration.number, iteration.sum_of_squares);
+///     }
+///     ControlFlow::Continue(())
+/// };
+/// let mut context = Context::with_progress(&threads, &mut report);
+/// let empty = Network::new().adjustment(&Options::default()).run_in(&mut context);
+/// assert!(empty.is_err());
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub struct Context<'a> {
     /// The threads.
     pub threads: &'a Threads,
