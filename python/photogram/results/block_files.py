@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from photogram.network.observations import Observation
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Unknown
 from photogram.results import datum, features, parts
+from photogram.results.result import Result
 from photogram.results.result_files import (
     GIVEN_SD,
     REDUNDANCY,
@@ -41,9 +42,6 @@ from photogram.results.result_files import (
 from photogram.results.tables import TABLE_FILES, TABLES
 from photogram.statistics.findings import Removed
 from photogram.words import Phrase
-
-if TYPE_CHECKING:
-    from photogram import Result
 
 KIND = "block"
 _ANGLES = ("omega", "phi", "kappa")

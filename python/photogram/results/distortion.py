@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -27,9 +26,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.parts import AdjustedCamera
-
-if TYPE_CHECKING:
-    from photogram import Result
+from photogram.results.result import Result
 
 DISTANCES = ("c", "f", "fx")
 INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy", "beta"})

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
@@ -22,11 +23,9 @@ from photogram.network.motion import focal_images
 from photogram.network.rays import Rays
 from photogram.network.wider_models import calibration_words
 from photogram.results.network import AdjustedNetwork
+from photogram.results.result import Result
 from photogram.statistics.findings import Tested
 from photogram.words import Phrase
-
-if TYPE_CHECKING:
-    from photogram import Result, _photocore
 
 HELD = Phrase("test.held")  # Type of these tests
 SUSPECTED = 5  # Largest number of tested stations and points: those with the worst images

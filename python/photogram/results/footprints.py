@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,9 +16,7 @@ from photogram.network.cameras import camera_rows, rays_of_row
 from photogram.network.motion import of_pictures, scanners
 from photogram.network.rays import LocalAxes, local_axes
 from photogram.results.fixed_tests import as_adjusted
-
-if TYPE_CHECKING:
-    from photogram import Result
+from photogram.results.result import Result
 
 SIDE = 4  # Vertices of an outline on each side of the image
 HORIZON = math.radians(80.0)  # Limit of footprints from the vertical

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.messages import by_name
 from photogram.results.grouping import Grouping, GroupsArgument, grouped, observables
 from photogram.results.network import AdjustedNetwork
+from photogram.results.result import Result
 from photogram.show.methods import Tabular
 from photogram.show.page import Document, Section, about
 from photogram.show.quantity import Quantity, Table, column, of_each
@@ -28,9 +29,6 @@ from photogram.statistics.components import Component, balanced
 from photogram.statistics.distributions import bonferroni
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import phrase
-
-if TYPE_CHECKING:
-    from photogram import Result
 
 TESTABLE = 0.5  # Smallest redundancy of a tested group
 LEVEL = 0.05

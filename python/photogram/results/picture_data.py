@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +22,7 @@ from photogram.results.film_report import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints, metric_covariances
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import AdjustedCamera
+from photogram.results.result import Result
 from photogram.results.tables import Tests
 from photogram.show.page import about
 from photogram.show.sketch.marks import Arrows, Ellipses, Panel, around, ellipse_axes
@@ -30,9 +30,6 @@ from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK, round_length
 from photogram.statistics.findings import Tested
 from photogram.words import phrase
-
-if TYPE_CHECKING:
-    from photogram import Result
 
 
 class PicturedNetwork(plots.Pictured):

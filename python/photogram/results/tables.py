@@ -26,6 +26,7 @@ from photogram.results.network_tables import (
     test_value,
 )
 from photogram.results.network_trial import KINDS, OBSERVATION, type_name
+from photogram.results.result import Result
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Link, Quantity, column, component, frame, joined, long
 from photogram.statistics.distributions import lambda0
@@ -35,8 +36,6 @@ from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     import pandas as pd
-
-    from photogram import Result
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
+from photogram.results.result import Result
 from photogram.results.statement.budget import budget_fields
 from photogram.results.statement.comparison import LEVEL, LeftOut, limit_of
 from photogram.results.statement.figures import Figures, Prediction, Surface
@@ -24,7 +25,7 @@ from photogram.statistics.verdict import Rule, fitting_rules
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
-    from photogram import Result, Statement
+    from photogram import Statement
 
 NOT_USABLE = 4  # Exit code
 HEIGHT_KINDS = 10.0  # Mean difference between two height systems (sd)

@@ -17,6 +17,7 @@ from photogram.results.features import Features, quantity_columns, through, unit
 from photogram.results.footprints import footprints
 from photogram.results.network_sections import fit_of_images
 from photogram.results.parts import AdjustedCamera
+from photogram.results.result import Result
 from photogram.results.statement import tables as declared
 from photogram.results.statement.budget import Budget, budget_fields
 from photogram.results.statement.comparison import Compared, control_places, in_order
@@ -32,7 +33,7 @@ from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, SOFT, VERMILION, round_length
 
 if TYPE_CHECKING:
-    from photogram import Result, Statement
+    from photogram import Statement
 
 MAX_FINE_SOURCES = 12  # Sources of a budget in addition to the types of observations
 MAX_RADII = 11
