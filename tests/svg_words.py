@@ -3,7 +3,7 @@
 from itertools import combinations
 from xml.etree import ElementTree
 
-from photogram.show.sketch.letters import width
+from photogram.show.sketch.layout import width
 from photogram.show.sketch.svg import svg_of
 
 

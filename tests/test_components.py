@@ -21,7 +21,7 @@ from photogram import (
 from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
 from photogram.results.components import statement
-from photogram.results.group_sums import Probing
+from photogram.results.grouping import Probing
 from photogram.statistics.components import GroupsOf, balanced, estimate, helmert_step
 
 PUBLISHED = Path(__file__).parent / "data" / "statistics" / "published_problems.json"

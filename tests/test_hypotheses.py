@@ -22,7 +22,7 @@ from photogram import (
     snoop,
 )
 from photogram.network import Attitude, rotation_matrix
-from photogram.results.duplicates import duplicates
+from photogram.results.findings import duplicates
 from photogram.statistics.findings import IMAGES, Removed
 from photogram.words import phrase
 

@@ -12,8 +12,7 @@ import pytest
 from example_scripts import load
 from photogram import adjust, collection, formats, simulate
 from photogram.giant import read_project
-from photogram.show.sketch.layout import LABEL, laid_out
-from photogram.show.sketch.letters import ticks, width, wrapped
+from photogram.show.sketch.layout import LABEL, laid_out, ticks, width, wrapped
 from photogram.show.sketch.marks import (
     Ellipses,
     Markers,

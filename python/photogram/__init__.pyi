@@ -64,8 +64,8 @@ from .results.differences import differences as differences
 from .results.features import Feature as Feature
 from .results.features import Features as Features
 from .results.features import features as features
-from .results.group_sums import GroupSums as GroupSums
-from .results.group_sums import group_sums as group_sums
+from .results.grouping import GroupSums as GroupSums
+from .results.grouping import group_sums as group_sums
 from .results.model_tests import compare as compare
 from .results.model_tests import score_test as score_test
 from .results.model_tests import terms_test as terms_test

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from photogram.network.hull import area, hull, outside
-from photogram.results.statement.layout import layout as layout_of
+from photogram.results.statement.comparison import layout as layout_of
 
 SQUARE = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 10.0], [100.0, 100.0, 20.0], [0.0, 100.0, 0.0]])
 

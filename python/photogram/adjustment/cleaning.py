@@ -17,8 +17,7 @@ from photogram.adjustment.snooping import snoop
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results.components import VarianceComponents
-from photogram.results.group_sums import Probing
-from photogram.results.grouping import Grouping, GroupsArgument, grouped, observables
+from photogram.results.grouping import Grouping, GroupsArgument, Probing, grouped, observables
 from photogram.results.network import AdjustedNetwork
 from photogram.results.snooping_options import SnoopOptions
 from photogram.results.snooping_result import Snooped

@@ -17,8 +17,7 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.block import Block
 from photogram.network.observations.observation import Observation
 from photogram.results.components import VarianceComponents
-from photogram.results.group_sums import Left, Probing
-from photogram.results.grouping import Grouping, GroupsArgument, grouped, observables
+from photogram.results.grouping import Grouping, GroupsArgument, Left, Probing, grouped, observables
 from photogram.results.network import AdjustedNetwork
 from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
 from photogram.words import phrase

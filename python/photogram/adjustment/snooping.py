@@ -34,6 +34,7 @@ from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import InnerConstraints
 from photogram.network.motion import timed_photos
 from photogram.network.subset import image_rows, with_rejected_points
+from photogram.results.evaluation import type_factors
 from photogram.results.fixed_tests import held_remark, held_tested
 from photogram.results.hypothesis_tests import hypotheses, largest_odds
 from photogram.results.network import MAX_BIAS_RATIO, AdjustedNetwork
@@ -56,7 +57,6 @@ from photogram.results.result import Result
 from photogram.results.snooping_log import Aside, Exchange, Outcome, snooped
 from photogram.results.snooping_options import SnoopOptions
 from photogram.results.snooping_result import Snooped, recorded
-from photogram.results.type_factors import type_factors
 from photogram.statistics.findings import IMAGES, Removed, Tested
 from photogram.statistics.weight_rules import needed, wrong_types
 from photogram.words import Phrase, phrase

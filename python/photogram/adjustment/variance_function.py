@@ -15,8 +15,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.motion import focal_images
 from photogram.results.components import Bin, VarianceFunction
-from photogram.results.group_sums import Probing, group_sums
-from photogram.results.grouping import Grouping, observables
+from photogram.results.grouping import Grouping, Probing, group_sums, observables
 from photogram.results.network import AdjustedNetwork
 from photogram.statistics.components import GroupsOf
 from photogram.statistics.variance_function import estimate_function

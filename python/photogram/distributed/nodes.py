@@ -17,11 +17,10 @@ from photogram.distributed.run import read_manifest, read_node, result_folder
 from photogram.io.structure import Decoder, Encoder
 from photogram.lazy_dataclasses import replace
 from photogram.network.core_arrays import block_network
-from photogram.results.block_files import block_files
+from photogram.results.block_files import block_files, read_block_result
 from photogram.results.datum import datum_of
 from photogram.results.result import Result
 from photogram.results.result_files import read_summary
-from photogram.results.saved_block import read_block_result
 
 if TYPE_CHECKING:
     from photogram._photocore import BlockSolution

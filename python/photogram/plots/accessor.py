@@ -9,15 +9,13 @@ from types import MethodType
 from typing import Any, Concatenate, Generic, ParamSpec
 
 from photogram.errors import InputError
-from photogram.plots.correlations import correlations
-from photogram.plots.distortion import distortion
+from photogram.plots.distortion import correlations, distortion
 from photogram.plots.features import features
-from photogram.plots.network import network
+from photogram.plots.network import network, undetected
 from photogram.plots.redundancy import redundancy
 from photogram.plots.residuals import films, residuals
 from photogram.plots.tests import tests
 from photogram.plots.trajectories import trajectory
-from photogram.plots.undetected import undetected
 from photogram.show.page import Drawing, about
 from photogram.show.sketch.plot import Plot
 

@@ -1,4 +1,4 @@
-"""The network in plan: photos, footprints, points, control, error ellipses."""
+"""The network in plan: photos, footprints, points, control, error ellipses, undetected errors."""
 
 from __future__ import annotations
 
@@ -9,12 +9,14 @@ import numpy as np
 
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Bools, Floats, Indices
+from photogram.errors import InputError
 from photogram.plots.picture_data import Pictured, Plan
 from photogram.plots.selection import thinned
 from photogram.show.sketch import marks as shapes
-from photogram.show.sketch.marks import Mark, Markers, Panel, ScaleBar
+from photogram.show.sketch.marks import Mark, Markers, Panel, ScaleBar, Shades
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, PURPLE, SKY, SOFT, VERMILION, round_length
+from photogram.words import phrase
 
 MAX_POINTS, MAX_PHOTOS, MAX_FOOTPRINTS, MAX_ELLIPSES, MAX_VECTORS = 6000, 2000, 400, 150, 300
 MAX_NAMES = 40  # Of photos, and of control and check points
@@ -294,3 +296,61 @@ def _names(view: View, ends: Floats) -> list[Mark]:
     texts = [*(plan.point_ids[row] for row in control.tolist()), *plan.photo_ids[:photos]]
     colours = [INK] * len(control) + [SOFT] * photos
     return [shapes.Names(places, texts, colours, ends)] if texts else []
+
+
+MAX_STATIONS = 300
+CENTRAL_CHANGES = 0.9  # Part of the larger changes that defines the colours
+LONGEST = 4.0  # Usual changes; larger ones are without arrows
+
+
+def undetected(result: Any, *, error: int | None = None) -> Plot:
+    """Plot what an undetected error would change: points in plan, and their changes.
+
+    Points are coloured if a coordinate changes by more standard deviations than the verdict permits. Arrows
+    are changes by an error of the size of the minimal detectable bias, or of a plausible size if an error of
+    any size remains undetected. The points or photos of an erroneous observation are marked.
+
+    Parameters
+    ----------
+    error
+        Row of :meth:`~photogram.Result.external_reliability`; None: the error with the worst effect.
+
+    Raises
+    ------
+    InputError
+        If the effect of the error was not computed, because it is small, or the network is not tested.
+    """
+    drawn = result._plot_data()
+    moved = drawn.moved(error)
+    if moved is None:
+        raise InputError(phrase("plot.undetected"))
+    view = View(drawn.plan)
+    photos, _ = thinned("photos", np.arange(len(view.photos)), MAX_STATIONS)
+    far, places, shades = moved.ratios > moved.limit, view.points[moved.points], None
+    label = f"change below {moved.limit:g} sd ({np.count_nonzero(~far):,})"
+    marks: list[Mark] = [Markers(places[~far], "o", 2.5, FAINT, label=label, layer=6.2)]
+    if far.any():
+        # The point with the error often changes by far more than all others.
+        ratios = moved.ratios[far]
+        high = max(float(np.quantile(ratios, CENTRAL_CHANGES)), 2.0 * moved.limit)
+        shades = Shades(moved.limit, high, "change, standard deviations", log=True)
+        marks.append(Markers(places[far], "o", 5.5, values=ratios, shades=shades, rising=True, layer=6.5))
+    marks.append(Markers(view.photos[photos], "+", 4.0, FAINT, edge=0.6, label="photo"))
+    size = usual(moved.changes)
+    short = np.linalg.norm(moved.changes, axis=1) <= LONGEST * size
+    rows, changes = moved.points[short], moved.changes[short]
+    arrows, bars, _ = vectors(view, rows, changes, size, "change", "changes of points by the error")
+    marks += arrows
+    control = view.points[drawn.plan.kinds == "control"]
+    if len(control):
+        marks.append(Markers(control, "^", 5.0, INK, "white", 0.8, label="control point", layer=5.0))
+    if len(moved.suspects):
+        at, label = view.flat(moved.suspects), "observation with the error"
+        marks.append(Markers(at, "s", 11.0, PURPLE, "none", 1.6, label=label, layer=7.0))
+    count, every = len(moved.points), moved.several
+    notes = [
+        moved.sentence,
+        f"{count:,} of {every:,} points are drawn" if count < every else "",
+        "" if short.all() else f"{np.count_nonzero(~short):,} larger changes are drawn without arrows",
+    ]
+    return view.plot(marks, title="Effect of an undetected error", notes=notes, bars=bars, shades=shades)

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -33,9 +33,11 @@ from photogram.results.distortion import (
 from photogram.results.model_tests import LEVEL, TermsTest, groups_of_terms, joint_test, terms_test
 from photogram.results.network_tables import image_axes
 from photogram.results.parts import AdjustedCamera
-from photogram.results.result import Result
 from photogram.show.page import Drawing, Fact, Facts, Layers, Part, Remarks, Section, about, significant
 from photogram.show.quantity import Axis, Quantity, Table, component, for_people, members, of_each, records
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 CORRELATED = 0.95  # The report lists larger correlations
 ASKED = 20  # Largest number of cameras with correlations to the poses of photos

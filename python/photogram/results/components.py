@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.results.group_sums import GroupSum, sum_columns
+from photogram.results.grouping import GroupSum, sum_columns
 from photogram.results.network import AdjustedNetwork
 from photogram.show.judgement import remarks_section, verdict_document
 from photogram.show.methods import Judged, Tabular

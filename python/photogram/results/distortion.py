@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,7 +27,9 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.motion import focal_images
 from photogram.results.parts import AdjustedCamera
-from photogram.results.result import Result
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 DISTANCES = ("c", "f", "fx")
 INTERIOR = frozenset({*DISTANCES, "fy", "xp", "yp", "cx", "cy", "beta"})

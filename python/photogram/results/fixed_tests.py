@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,9 +23,11 @@ from photogram.network.motion import focal_images
 from photogram.network.rays import Rays
 from photogram.network.wider_models import calibration_words
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
 from photogram.statistics.findings import Tested
 from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 HELD = Phrase("test.held")  # Type of these tests
 SUSPECTED = 5  # Largest number of tested stations and points: those with the worst images

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,12 +31,14 @@ from photogram.results.distortion import INTERIOR, compared_places, partials_of,
 from photogram.results.fixed_tests import score
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import AdjustedCamera
-from photogram.results.result import Result
 from photogram.show.methods import Tabular
 from photogram.show.page import Document, Section, about
 from photogram.show.quantity import Quantity, Table, of_each
 from photogram.statistics.agreement import quadratic
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 LEVEL = 0.05  # Significance level of terms
 KEPT = 0.01  # Significance level of useful terms

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,8 +14,11 @@ from photogram.network.block import Block
 from photogram.network.geometry import lengths_of_units
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import Iteration, Terms
-from photogram.results.result import Result
 from photogram.show.quantity import Axis, Link, Quantity, column
+
+if TYPE_CHECKING:
+    from photogram import Result
+
 
 TURNS = tuple(Axis.turned(name, "deg") for name in ("omega", "phi", "kappa"))  # Of attitudes
 

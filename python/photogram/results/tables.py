@@ -14,7 +14,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results import network_tables, parts
 from photogram.results.features import Features, deviation_quantities, quantity_columns
-from photogram.results.group_sums import sums_by_kind
+from photogram.results.grouping import sums_by_kind
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import (
     component_axis,

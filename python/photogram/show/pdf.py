@@ -17,7 +17,7 @@ from photogram.lazy_dataclasses import fields, replace
 from photogram.show.cells import formatted
 from photogram.show.html import inlined
 from photogram.show.page import Column, Document, Drawing, Table
-from photogram.show.sketch.letters import width
+from photogram.show.sketch.layout import width
 from photogram.show.sketch.svg import LETTERS
 
 FONTS = ("Libertinus Serif", "New Computer Modern Math", "DejaVu Sans Mono")

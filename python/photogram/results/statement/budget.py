@@ -26,8 +26,7 @@ from photogram.network.rays import local_axes
 from photogram.results import network_trial
 from photogram.results.components import VarianceComponents
 from photogram.results.covariance import Covariances, Item, adjusted, used_rows
-from photogram.results.group_sums import Left, Probing
-from photogram.results.grouping import Grouping, grouped, observables
+from photogram.results.grouping import Grouping, Left, Probing, grouped, observables
 from photogram.results.result import Result
 from photogram.results.statement.request import invalid
 from photogram.results.statement.texts import Texts

@@ -19,9 +19,9 @@ from photogram.results.result import Result
 from photogram.results.statement import comparison, tables
 from photogram.results.statement import standards as by_standard
 from photogram.results.statement.budget import Budget, budgets, chosen, wanted
+from photogram.results.statement.comparison import Layout, layout
 from photogram.results.statement.figures import Figures, figures
 from photogram.results.statement.judgement import Judged, judged
-from photogram.results.statement.layout import Layout, layout
 from photogram.results.statement.request import Asked
 from photogram.results.statement.texts import Texts
 from photogram.show.methods import Documented

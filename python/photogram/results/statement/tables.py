@@ -11,7 +11,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.io.csv_text import csv_text
-from photogram.results.group_sums import sums_by_kind
+from photogram.results.grouping import sums_by_kind
 from photogram.results.result import Result
 from photogram.results.statement.budget import Budget, kind_of
 from photogram.results.statement.comparison import LeftOut, limit_of
