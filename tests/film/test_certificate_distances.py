@@ -8,7 +8,7 @@ import pytest
 from message_codes import coded
 from photogram import AdjustmentError
 from photogram.film import Crossing, MarkDistance, RightAngle, adjust_distances
-from photogram.film.distances import _angle, _crossing, _distance
+from photogram.film.distances import _linearized, _observed
 
 DESIGN = {"ll": (-106, -106), "ur": (106, 106), "ul": (-106, 106), "lr": (106, -106)}
 DESIGN |= {"ml": (-110, 0), "mr": (110, 0), "mt": (0, 110), "mb": (0, -110)}
@@ -32,19 +32,16 @@ ALL = [(i, j) for i in range(8) for j in range(i)]
 
 
 def test_partials_are_those_of_differences():
-    of = {name: row for row, name in enumerate(MARKS)}
-    xy = place(1, 3.0)
-    rows = [_distance(MarkDistance("ll", "mt", 1.0, 1.0), of, 8), _angle(RightAngle(LINES, 1.0), of)]
-    rows += _crossing(Crossing(LINES, 1.0), of)
-    for row in rows:
-        value, partials = row.at(xy)
-        step = 1e-5
-        for k in range(16):
-            moved = np.zeros(16)
-            moved[k] = step
-            both = [row.at(xy + sign * moved.reshape(8, 2))[0] for sign in (1, -1)]
-            assert partials[k] == pytest.approx((both[0] - both[1]) / (2 * step), abs=1e-8)
-        assert math.isfinite(value)
+    xy, step = place(1, 3.0), 1e-5
+    distance = MarkDistance("ll", "mt", 1.0, 1.0)
+    rows = _observed(MARKS, [distance], [RightAngle(LINES, 1.0), Crossing(LINES, 1.0)])
+    values, partials = _linearized(rows, xy)
+    assert values == pytest.approx([float(row.at(xy).real) for row in rows])
+    for k in range(16):
+        moved = np.zeros(16)
+        moved[k] = step
+        both = [np.array([row.at(xy + sign * moved.reshape(8, 2)) for row in rows]) for sign in (1, -1)]
+        assert partials[:, k] == pytest.approx((both[0].real - both[1].real) / (2 * step), abs=1e-8)
 
 
 def test_a_free_figure_is_the_true_one_as_near_to_the_design_as_it_comes():
@@ -64,12 +61,10 @@ def test_lines_move_the_figure_to_the_minimum_of_all_squares():
     found = adjust_distances(
         MARKS, design, distances(true, few, seed=1), design_sd=np.full(8, 0.02), conditions=lines
     )
-    of = {name: row for row, name in enumerate(MARKS)}
-    rows = [_distance(each, of, 8) for each in distances(true, few, seed=1)]
-    rows += [_angle(lines[0], of), *_crossing(lines[1], of)]
+    rows = _observed(MARKS, distances(true, few, seed=1), lines)
 
     def squares(xy):
-        own = sum(((each.observed - each.at(xy)[0]) / each.sd) ** 2 for each in rows)
+        own = sum(((each.observed - each.at(xy).real) / each.sd) ** 2 for each in rows)
         return own + float((((design - xy) / 0.02) ** 2).sum())
 
     least = squares(found.xy)

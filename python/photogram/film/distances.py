@@ -12,8 +12,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError
@@ -22,8 +25,11 @@ from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import phrase
 
+Points = NDArray[Any]  # real coordinates, or complex ones for partials
+
 MAX_STEPS = 50
 CONVERGED = 1e-13  # relative to the format
+COMPLEX_STEP = 1e-30  # mm; its square vanishes beside coordinates
 DETERMINED = 1e-6  # least singular value of a determined movement, relative to the largest
 
 
@@ -75,7 +81,7 @@ class AdjustedMarks:
     Attributes
     ----------
     names
-        Names of the observations: `ml-mr`, `angle ..`, `crossing .. x`, `ll.x` for design coordinates.
+        Names of the marks.
     xy
         (n, 2) mm.
     covariance
@@ -84,7 +90,7 @@ class AdjustedMarks:
     free
         Datum defect, removed by inner constraints on the design.
     rows
-        Names of the observed numbers: `ml-mr`, `angle ..`, `crossing .. x`, `ll.x` of design places.
+        Names of the observations: `ml-mr`, `angle ..`, `crossing .. x`, `ll.x` for design coordinates.
     observed, sd, residuals
         (r,) mm, angles in radians. Residuals are observed minus computed.
     redundancy, standardized
@@ -113,12 +119,12 @@ class AdjustedMarks:
 
 @dataclass(frozen=True)
 class _Row:
-    """Observation with its computed value and partials (2n,) at coordinates (n, 2)."""
+    """Observation; `at` returns its values at coordinates (..., n, 2), which may be complex."""
 
     name: str
     observed: float
     sd: float
-    at: Callable[[Floats], tuple[float, Floats]]
+    at: Callable[[Points], Points]
 
 
 def adjust_distances(
@@ -148,16 +154,13 @@ def adjust_distances(
     AdjustmentError
         If the iteration does not converge because design and distances belong to different marks.
     """
-    of = {name: row for row, name in enumerate(names)}
-    rows = [_distance(each, of, len(names)) for each in distances]
-    for each in conditions:
-        rows += [_angle(each, of)] if isinstance(each, RightAngle) else _crossing(each, of)
-    open_ = _open(_partials(rows, design), design)
+    rows = _observed(names, distances, conditions)
+    open_ = _open(_linearized(rows, design)[1], design)
     if open_ is None:
-        rows += _design(names, design, design_sd)
-        open_ = np.zeros((2 * len(names), 0))
+        for k, (name, sd) in enumerate(zip(names, design_sd.tolist(), strict=True)):
+            rows += _of_axes(f"{name}.", design[k].tolist(), sd, lambda xy, k=k: xy[..., k, :])  # type: ignore[misc]
+        open_ = np.zeros((design.size, 0))
     xy, fit, within = _adjusted(rows, design, free=open_.shape[1] > 0)
-    redundancy = fit.redundancy
     freedom = len(rows) - xy.size + open_.shape[1]
     return AdjustedMarks(
         names=tuple(names),
@@ -168,7 +171,7 @@ def adjust_distances(
         observed=np.array([each.observed for each in rows]),
         sd=np.array([each.sd for each in rows]),
         residuals=fit.residuals,
-        redundancy=redundancy,
+        redundancy=fit.redundancy,
         standardized=fit.standardized,
         test=global_test(fit.omega, freedom) if freedom else None,
     )
@@ -179,13 +182,12 @@ def _adjusted(rows: Sequence[_Row], design: Floats, *, free: bool) -> tuple[Floa
     xy = design.astype(float)
     variances = np.diag([each.sd**2 for each in rows])
     for _ in range(MAX_STEPS):
-        a = _partials(rows, xy)
-        misfit = np.array([each.observed - each.at(xy)[0] for each in rows])
-        left = _open(a, xy) if free else np.zeros((xy.size, 0))
+        computed, partials = _linearized(rows, xy)
+        left = _open(partials, xy) if free else np.zeros((xy.size, 0))
         if left is None:
             break
         within = np.linalg.qr(left, mode="complete")[0][:, left.shape[1] :]
-        fit = Fit.of(misfit, variances, a @ within)
+        fit = Fit.of(np.array([each.observed for each in rows]) - computed, variances, partials @ within)
         # Unobserved movements bring the network as near to the design as possible.
         step = within @ fit.parameters + left @ (left.T @ (design - xy).ravel())
         xy = xy + step.reshape(-1, 2)
@@ -196,8 +198,11 @@ def _adjusted(rows: Sequence[_Row], design: Floats, *, free: bool) -> tuple[Floa
     raise AdjustmentError(phrase("films.distances-not-converged"))
 
 
-def _partials(rows: Sequence[_Row], xy: Floats) -> Floats:
-    return np.array([each.at(xy)[1] for each in rows])
+def _linearized(rows: Sequence[_Row], xy: Floats) -> tuple[Floats, Floats]:
+    """Return (r,) computed values and their partials (r, 2n), by steps in the complex plane."""
+    moved = xy + 1j * COMPLEX_STEP * np.eye(xy.size).reshape(xy.size, *xy.shape)
+    found = np.array([each.at(moved) for each in rows])
+    return found[:, 0].real, found.imag / COMPLEX_STEP
 
 
 def _open(partials: Floats, xy: Floats) -> Floats | None:
@@ -216,69 +221,54 @@ def _sizes(matrix: Floats, count: int) -> Floats:
     return np.concatenate([found, np.zeros(count - len(found))])
 
 
-def _spread(n: int, parts: dict[int, Floats]) -> Floats:
-    row = np.zeros((n, 2))
-    for mark, part in parts.items():
-        row[mark] += part
-    return row.ravel()
+def _observed(
+    names: Sequence[str], distances: Sequence[MarkDistance], conditions: Sequence[RightAngle | Crossing]
+) -> list[_Row]:
+    of = {name: row for row, name in enumerate(names)}
+    rows = [
+        _Row(each.name, each.length, each.sd, partial(_distance, of[each.first], of[each.second]))
+        for each in distances
+    ]
+    for each in conditions:
+        marks = [of[name] for name in each.marks]
+        first, second = (f"{each.marks[row]}-{each.marks[row + 1]}" for row in (0, 2))
+        if isinstance(each, RightAngle):
+            name = f"angle {first} to {second}"
+            rows.append(_Row(name, each.angle, each.sd, partial(_angle, marks)))
+        else:
+            name = f"crossing {first} with {second} "
+            rows += _of_axes(name, each.place, each.sd, partial(_crossing, marks))
+    return rows
 
 
-def _distance(each: MarkDistance, of: dict[str, int], n: int) -> _Row:
-    i, j = of[each.first], of[each.second]
-
-    def at(xy: Floats) -> tuple[float, Floats]:
-        apart = xy[j] - xy[i]
-        length = float(np.hypot(*apart))
-        return length, _spread(n, {i: -apart / length, j: apart / length})
-
-    return _Row(each.name, each.length, each.sd, at)
-
-
-def _angle(each: RightAngle, of: dict[str, int]) -> _Row:
-    i, j, k, m = (of[name] for name in each.marks)
-
-    def at(xy: Floats) -> tuple[float, Floats]:
-        a, b = xy[j] - xy[i], xy[m] - xy[k]
-        by_a, by_b = (np.array([-v[1], v[0]]) / (v @ v) for v in (a, b))
-        parts = _spread(len(xy), {i: by_a, j: -by_a}) + _spread(len(xy), {k: -by_b, m: by_b})
-        return math.atan2(a[0] * b[1] - a[1] * b[0], float(a @ b)), parts
-
-    first, second = (f"{each.marks[row]}-{each.marks[row + 1]}" for row in (0, 2))
-    return _Row(f"angle {first} to {second}", each.angle, each.sd, at)
-
-
-def _crossing(each: Crossing, of: dict[str, int]) -> list[_Row]:
-    i, j, k, m = (of[name] for name in each.marks)
-
-    def at(xy: Floats, axis: int) -> tuple[float, Floats]:
-        a, b, apart = xy[j] - xy[i], xy[m] - xy[k], xy[k] - xy[i]
-        normal_a, normal_b = np.array([-a[1], a[0]]), np.array([-b[1], b[0]])
-        along_a, along_b = float(apart @ normal_b / (a @ normal_b)), float(-apart @ normal_a / (b @ normal_a))
-        # Both lines pass through the intersection: the rows of their normals give its movement.
-        back = np.linalg.inv(np.array([normal_a, normal_b]))[axis]
-        of_a, of_b = back[0] * normal_a, back[1] * normal_b
-        parts = _spread(len(xy), {i: (1 - along_a) * of_a, j: along_a * of_a})
-        parts += _spread(len(xy), {k: (1 - along_b) * of_b, m: along_b * of_b})
-        return float((xy[i] + along_a * a)[axis]), parts
-
-    name = f"crossing {each.marks[0]}-{each.marks[1]} with {each.marks[2]}-{each.marks[3]}"
+def _of_axes(name: str, observed: Sequence[float], sd: float, at: Callable[[Points], Points]) -> list[_Row]:
+    """Return x and y of a point as observations."""
     return [
-        _Row(f"{name} {letter}", each.place[axis], each.sd, lambda xy, axis=axis: at(xy, axis))  # type: ignore[misc]
+        _Row(name + letter, observed[axis], sd, lambda xy, axis=axis: at(xy)[..., axis])  # type: ignore[misc]
         for axis, letter in enumerate("xy")
     ]
 
 
-def _design(names: Sequence[str], design: Floats, sd: Floats) -> list[_Row]:
-    return [
-        _Row(
-            f"{name}.{'xy'[axis]}",
-            float(design[row, axis]),
-            float(sd[row]),
-            lambda xy, row=row, axis=axis: (float(xy[row, axis]), _spread(len(xy), {row: np.eye(2)[axis]})),  # type: ignore[misc]
-        )
-        for row, name in enumerate(names)
-        for axis in (0, 1)
-    ]
+def _distance(i: int, j: int, xy: Points) -> Points:
+    return np.asarray(np.sqrt(((xy[..., j, :] - xy[..., i, :]) ** 2).sum(axis=-1)))
+
+
+def _angle(marks: Sequence[int], xy: Points) -> Points:
+    i, j, k, m = marks
+    a, b = xy[..., j, :] - xy[..., i, :], xy[..., m, :] - xy[..., k, :]
+    cosine, sine = (a * b).sum(axis=-1), _cross(a, b)
+    turn, change = (part(cosine) + 1j * part(sine) for part in (np.real, np.imag))
+    return np.asarray(np.angle(turn) + 1j * (change / turn).imag)
+
+
+def _crossing(marks: Sequence[int], xy: Points) -> Points:
+    i, j, k, m = marks
+    a, b, apart = xy[..., j, :] - xy[..., i, :], xy[..., m, :] - xy[..., k, :], xy[..., k, :] - xy[..., i, :]
+    return np.asarray(xy[..., i, :] + (_cross(apart, b) / _cross(a, b))[..., np.newaxis] * a)
+
+
+def _cross(a: Points, b: Points) -> Points:
+    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
 
 
 SINGULAR = 1e-9  # Least non-zero eigenvalue of a covariance, relative to the largest
