@@ -15,8 +15,8 @@ from message_codes import refusal
 from photogram import InputError
 from photogram.targets import Calibration, camera_files, first_values, projection_uncertainty, uncertainty_map
 from photogram.targets.camera_formats import CAMERA_FORMATS, cameras_covariance
+from photogram.targets.housing import worst
 from photogram.targets.mrcal import read_model
-from photogram.targets.projection import worst
 
 
 def calibrated(given, model):

@@ -7,7 +7,7 @@ from golden_calibrations import adjusted_rig
 
 from message_codes import refusal
 from photogram.targets import cross_validate
-from photogram.targets.cross_validation import changes_between, cross_map, parts_agree, splits
+from photogram.targets.cross_validation import changes_between, parts_agree, splits
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def test_chi2(found, expected):
 @pytest.mark.parametrize(("name", "distance"), [("infinity", np.inf), ("1 m", 1.0)])
 def test_maps(found, expected, camera, name, distance):
     pixels = np.array(golden("rig_small")["uncertainty"]["pixels"])
-    own = cross_map(found.whole, *found.housings[0], camera, pixels, distance)
+    own = found.map(camera, pixels, distance)
     golden_map = expected["maps"][f"camera {camera}, {name}"]
     cofactors = np.array(golden_map["cofactors"])
     variance = found.whole.variance

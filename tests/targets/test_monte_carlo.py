@@ -6,8 +6,7 @@ import pytest
 
 from photogram.targets import cross_validate, simulate_corners, triangulate
 from photogram.targets.cross_validation import changes_between
-from photogram.targets.housing import housing_of
-from photogram.targets.projection import common_partials, datum_rows, housing_rows
+from photogram.targets.housing import common_partials, datum_rows, housing_of, housing_rows
 from photogram.targets.vision import imaged
 
 DRAWS = 60

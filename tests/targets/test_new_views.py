@@ -9,8 +9,8 @@ from golden_calibrations import rig_small
 
 from photogram.lazy_dataclasses import replace
 from photogram.targets import Candidate
+from photogram.targets.housing import common_partials, datum_rows, worst
 from photogram.targets.new_views import added_by, best_views, placed_cofactors
-from photogram.targets.projection import common_partials, datum_rows, worst
 from photogram.targets.vision import composed
 
 SIZES = np.array([[1280, 960]] * 2)

@@ -24,9 +24,8 @@ from photogram.targets import (
     uncertainty_map,
 )
 from photogram.targets.drawing import steps_of_125
-from photogram.targets.housing import housing_of
+from photogram.targets.housing import datum_rows, housing_of
 from photogram.targets.new_views import candidate_views
-from photogram.targets.projection import datum_rows
 from photogram.targets.vision import imaged, rays
 
 PIXELS = [[40.0, 40.0], [640.0, 480.0]]

@@ -5,7 +5,7 @@ import pytest
 from given_targets import golden
 from golden_calibrations import opencv8, rig_small
 
-from photogram.targets.projection import datum_rows, projection_cofactors
+from photogram.targets.housing import datum_rows, projection_cofactors
 
 DISTANCES = {"infinity": np.inf, "1 m": 1.0}
 

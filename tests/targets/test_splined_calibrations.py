@@ -16,8 +16,8 @@ from photogram.show.quantity import records
 from photogram.targets import Board, Calibration, Corners, cross_validate, projection_uncertainty, read
 from photogram.targets.mrcal import mrcal_models
 from photogram.targets.output import rig_of
+from photogram.targets.page import splines
 from photogram.targets.regularisation import regularised, with_knot_sd
-from photogram.targets.tables import splines
 from photogram.targets.vision import composed
 
 

@@ -9,8 +9,9 @@ from golden_calibrations import stored
 
 from photogram import Camera
 from photogram.targets import Board, Calibration, Corners, projection_uncertainty
-from photogram.targets.calibration_difference import differences_at, fitted_motion
-from photogram.targets.maps import image_grid
+from photogram.targets.calibration_difference import differences_at
+from photogram.targets.lens_fit import fitted_motion
+from photogram.targets.uncertainty import image_grid
 from photogram.targets.vision import composed, imaged, touched
 
 ACROSS = 10.0
@@ -103,7 +104,7 @@ def test_differences(name, distances, tolerance):
         fitted = fitted_motion(a, b, near, list(distances.values()), criterion)
         for label, distance in distances.items():
             expected = np.array(data["differences"][name][key]["difference"][label])
-            found = differences_at(a, b, fitted, np.array(data["pixels"]), distance)
+            found = differences_at(a, b, fitted, np.array(data["pixels"]), [distance])
             compared = np.hypot(*expected.T) < 50
             assert compared.sum() >= 19
             assert np.abs(found - expected)[compared].max() < within

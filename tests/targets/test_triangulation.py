@@ -5,7 +5,7 @@ import pytest
 from given_targets import golden
 from golden_calibrations import rig_small
 
-from photogram.targets.projection import housing_rows
+from photogram.targets.housing import housing_rows
 from photogram.targets.triangulation import triangulated
 
 SD = 0.3

@@ -211,8 +211,7 @@ def _appraised(
     compared: Callable[[], Calibrated] | None,
 ) -> Calibrated:
     """Return an adjusted calibration with its uncertainty, and its differences from another one."""
-    from photogram.targets.appraisal import appraise
-    from photogram.targets.uncertainty import difference
+    from photogram.targets import appraise, difference
 
     with job.status("uncertainty") as progress:
         worth = appraise(found, options, progress)

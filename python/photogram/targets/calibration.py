@@ -32,12 +32,11 @@ from photogram.summaries import Brief, Rows, few
 from photogram.targets.board import Board
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corners import Corners, check_points
-from photogram.targets.housing import transformed
 from photogram.targets.motion import CLOCK, MAX_GAP_SECONDS, POWERS, dated, moved, moving, pictures_in_motion
 from photogram.targets.options import Regularisation, Shape, Synchronisation
 from photogram.targets.regularisation import weighted_block
 from photogram.targets.rounds import better_start, checked_clocks, has_knots, marked_as_mrcal
-from photogram.targets.vision import FLIP, photo_poses
+from photogram.targets.vision import FLIP, photo_poses, transformed
 from photogram.words import phrase
 
 BOARD = "board"  # name of the bend among the common unknowns

@@ -5,59 +5,73 @@ With the rays r_a of camera a at pixels q and the motion T of the axes,  d(q) = 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Literal, get_args
+from typing import Self, get_args
 
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import one_of
+from photogram.arguments.arrays import argument_error, one_of, value_field
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.network.hull import hull, outside
+from photogram.statistics.distributions import log_chi_square, log_fisher
 from photogram.summaries import Brief, Rows
-from photogram.targets.cross_validation import DifferenceTest, squares_of
-from photogram.targets.housing import transformed
-from photogram.targets.lens_fit import Moved, Points
-from photogram.targets.maps import at_distance, image_grid
-from photogram.targets.projection import fixed_points, of_functions, point_partials, worst
-from photogram.targets.sightings import nearest_rotations
-from photogram.targets.vision import imaged, motion_partials, moved_by, rays, unknown_of, values_of
+from photogram.targets.calibration_result import Calibrated
+from photogram.targets.housing import (
+    camera_number,
+    datum_rows,
+    fixed_points,
+    housing_of,
+    of_functions,
+    point_partials,
+    size_of,
+    worst,
+)
+from photogram.targets.lens_fit import Criterion, Fitted, fitted_motion
+from photogram.targets.uncertainty import at_distance, checked_distance, image_grid
+from photogram.targets.vision import imaged, points_at, transformed, unknown_of, values_of
 from photogram.words import Phrase, phrase
 
 RANK_TOLERANCE = 1e-5  # smaller singular values, relative to the largest, are rounding errors
 TEST_GRID = (12, 8)  # pixels across and down, for cameras of different models
+MIN_PROBABILITY = 0.01  # calibrations with a larger p agree
 
 
-@dataclass(frozen=True, eq=False)
-class Side:
-    """One of two compared calibrations."""
+@dataclass(frozen=True)
+class DifferenceTest:
+    """Test of a difference of two calibrations."""
 
-    name: str  # Name of the camera
-    camera: Camera
-    # (m, 2) observed board corners; empty if unknown
-    corners: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    covariance: Floats | None = None  # (p, p) of its parameters; None if unknown
-    # (6, p) the datum `corners` (:func:`~photogram.targets.projection.fixed_points`); None as
-    # `covariance`
-    rows: Floats | None = None
+    name: str  # name of the difference
+    chi2: float  # dk' cov(dk)^-1 dk over the variance of unit weight
+    dof: int
+    probability: float  # probability of an equal or larger difference
 
-    def covariances(self, points: Floats, finite: bool, rows: Floats | None) -> Floats:
-        """Return covariances (n, 2, 2) of projected points (n, 3), with datum rows (6, p)."""
-        assert self.covariance is not None
-        assert rows is not None
-        return of_functions(self.partials(points, finite, rows), self.covariance)
+    @classmethod
+    def of(cls, name: str, chi2: float, dof: int, freedom: float = math.inf) -> Self:
+        """Return the test; `freedom` is the redundancy of unit weight, infinite if known."""
+        known = math.isinf(freedom)
+        logarithm = log_chi_square(chi2, dof) if known else log_fisher(chi2 / dof, dof, freedom)
+        return cls(name, chi2, dof, float(np.exp(logarithm)))
 
-    def partials(self, points: Floats, finite: bool, rows: Floats) -> Floats:
-        """Return (n, 2, p) partials of projected points, with datum rows (6, p)."""
-        found = point_partials(self.camera, points, finite)
-        return np.asarray(found[:, :, :-6] + found[:, :, -6:] @ rows)
+    @property
+    def explained(self) -> bool:
+        """Whether the cofactors explain the difference."""
+        return self.probability > MIN_PROBABILITY
 
-    def sees(self, pixels: Floats) -> Bools:
-        """Return (n,) whether pixels are in the observed board region, if known."""
-        return ~outside(pixels, hull(self.corners)) if len(self.corners) else np.ones(len(pixels), dtype=bool)
+    @property
+    def factor(self) -> float:
+        """Mean ratio of the differences to their standard deviations."""
+        return math.sqrt(self.chi2 / self.dof)
+
+
+def squares_of(vectors: Floats, covariances: Floats) -> Floats:
+    """Return (n,) d' Q^-1 d of (n, 2) vectors."""
+    solved = np.linalg.solve(covariances, vectors[:, :, np.newaxis])[:, :, 0]
+    return np.asarray((vectors * solved).sum(axis=1))
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -183,231 +197,196 @@ def motion_of(found: CameraDifference) -> Phrase:
     return Phrase(f"difference.{'motion' if found.fitted.finite else 'rotation'}", fields)
 
 
-def compared(
-    a: Side,
-    b: Side,
-    size: tuple[int, int],
-    distances: tuple[float, ...],
+def difference(
+    a: Calibrated | Camera,
+    b: Calibrated | Camera,
+    distance: float | Sequence[float] = np.inf,
     *,
-    unit: str = "m",
+    camera: int | str = 0,
+    size: tuple[int, int] | None = None,
     criterion: Criterion = "pixels",
     radius: float | None = None,
     grid: tuple[int, int] = (60, 40),
 ) -> CameraDifference:
-    """Compare two cameras at several distances over the image of a.
+    """Compare the projections of two calibrations without the motion of their axes.
 
-    `size` is the image width and height of a. `criterion` selects the misfit minimised by the motion between
-    them. `radius` limits the pixels of the fit about the centre. Without it, all weighted pixels are used if
-    both covariances are known, else a sixth of the shorter side. The grid is pixels across and down.
+    Parameters
+    ----------
+    a, b
+        Adjusted calibrations, or cameras without uncertainty.
+    distance
+        Distances of comparison, one or several, from the centre of camera a in the unit of its board. At
+        infinity, only a rotation is fitted. One finite distance leaves the translation arbitrary.
+    camera
+        Camera of calibrations: number or name.
+    size
+        Image width and height of a; None: from its calibration.
+    criterion
+        `pixels`: least squares of the differences, weighted by the uncertainties if both are known. `mrcal`:
+        least fourth powers of angles between rays.
+    radius
+        Radius about the image centre of the pixels for the motion fit. None: all, weighted, or a sixth of the
+        shorter side if uncertainties are unknown.
+    grid
+        Number of pixels across and down.
+
+    Raises
+    ------
+    InputError
+        If an argument is neither a calibration nor a camera, or if the image size is unknown. If a distance
+        is not positive, or if the cameras have too few common pixels.
     """
+    distances = [distance] if isinstance(distance, float | int) else list(distance)
+    if not distances:
+        raise argument_error("distance", "empty")
+    if size is None:
+        if not isinstance(a, Calibrated):
+            raise argument_error("size", "empty")
+        size = size_of(a, camera_number(a, camera))
+    first, second = _side(a, camera, "a"), _side(b, camera, "b")
+    away = tuple(checked_distance(each) for each in distances)
     one_of("criterion", criterion, get_args(Criterion))
     columns, rows, pixels = image_grid(size, grid)
-    known = a.covariance is not None and b.covariance is not None
+    known = first.covariance is not None and second.covariance is not None
     reach = radius or (np.inf if known else min(size) / 6)
     near = pixels[np.hypot(*(pixels - (np.array(size) - 1) / 2).T) < reach]
-    weights = _weights(a, b, near, distances, criterion) if known else None
-    fitted = fitted_motion(a.camera, b.camera, near, distances, criterion, weights)
-    vectors = np.stack([differences_at(a.camera, b.camera, fitted, pixels, each) for each in distances])
-    expected = _Expected(a, b, fitted, near, distances) if known else None
-    shape = (len(distances), len(rows), len(columns), 2)
-    others, shared = set(map(tuple, b.corners.tolist())), 0.0
-    if len(a.corners):
-        shared = sum(each in others for each in map(tuple, a.corners.tolist())) / len(a.corners)
+    weights, inverse = None, np.empty(0)
+    if known:
+        own, other = (
+            side.covariances(points_at(side.camera, near, away), _finite(away, near), side.rows)
+            for side in (first, second)
+        )
+        inverse = np.full_like(own, np.nan)
+        certain = np.isfinite(own + other).all(axis=(1, 2))
+        inverse[certain] = np.linalg.inv((own + other)[certain])
+        weights = inverse if criterion == "pixels" else 1 / (worst(own) * worst(other)) ** 2
+    fitted = fitted_motion(first.camera, second.camera, near, away, criterion, weights)
+    vectors = differences_at(first.camera, second.camera, fitted, pixels, away)
+    shape, covariances, test = (len(away), len(rows), len(columns), 2), None, None
+    others = set(map(tuple, second.corners.tolist()))
+    shared = sum(each in others for each in map(tuple, first.corners.tolist())) / (len(first.corners) or 1)
+    if known:
+        # The datum of the fit, with the motion removed from both
+        points = points_at(first.camera, near, away)
+        moved = transformed(fitted.motion, points)
+        usable = np.isfinite(inverse).all(axis=(1, 2)) & np.isfinite(imaged(second.camera, moved).xy).all(
+            axis=1
+        )
+        datums = [
+            fixed_points(side.camera, each[usable], inverse[usable], fitted.finite)
+            for side, each in ((first, points), (second, moved))
+        ]
+        points = points_at(first.camera, pixels, away)
+        own, other = (
+            side.covariances(each, _finite(away, pixels), datum)
+            for side, each, datum in zip(
+                (first, second), (points, transformed(fitted.motion, points)), datums, strict=True
+            )
+        )
+        covariances = (own + other).reshape(*shape, 2)
+        test = None if shared > 0 else _test(first, second, size, away, fitted, datums)
     return CameraDifference(
-        cameras=(a.name, b.name),
+        cameras=(first.name, second.name),
         size=size,
-        unit=unit,
+        unit=next((each.calibration.board.unit for each in (a, b) if isinstance(each, Calibrated)), "m"),
         criterion=criterion,
         fitted=fitted,
         columns=columns,
         rows=rows,
-        distances=distances,
+        distances=away,
         vectors=vectors.reshape(shape),
-        covariances=None if expected is None else expected.covariances(pixels, distances).reshape(*shape, 2),
-        inside=(a.sees(pixels) & b.sees(pixels + vectors[0])).reshape(shape[1:3]),
+        covariances=covariances,
+        inside=(first.sees(pixels) & second.sees(pixels + vectors[: len(pixels)])).reshape(shape[1:3]),
         shared=shared,
-        test=None if expected is None or shared > 0 else expected.test(size, distances),
+        test=test,
     )
 
 
-def _weights(a: Side, b: Side, pixels: Floats, distances: tuple[float, ...], criterion: Criterion) -> Floats:
-    """Return pixel weights at each distance from covariances in datum `corners`."""
-    found = []
-    for each in distances:
-        finite = bool(np.isfinite(each))
-        own, other = (
-            side.covariances(points_at(side.camera, pixels, [each]), finite, side.rows) for side in (a, b)
-        )
-        found.append(
-            _inverted(own + other) if criterion == "pixels" else 1 / (worst(own) * worst(other)) ** 2
-        )
-    return np.concatenate(found)
+@dataclass(frozen=True, eq=False)
+class Side:
+    """One of two compared calibrations."""
+
+    name: str  # Name of the camera
+    camera: Camera
+    # (m, 2) observed board corners; empty if unknown
+    corners: Floats = field(default_factory=lambda: np.empty((0, 2)))
+    covariance: Floats | None = None  # (p, p) of its parameters; None if unknown
+    # (6, p) the datum `corners` (:func:`~photogram.targets.housing.fixed_points`); None as `covariance`
+    rows: Floats | None = None
+
+    def covariances(self, points: Floats, finite: Bools, rows: Floats | None) -> Floats:
+        """Return covariances (n, 2, 2) of projected points (n, 3), with datum rows (6, p)."""
+        assert self.covariance is not None
+        return of_functions(self.partials(points, finite, rows), self.covariance)
+
+    def partials(self, points: Floats, finite: Bools, rows: Floats | None) -> Floats:
+        """Return (n, 2, p) partials of projected points, with datum rows (6, p)."""
+        assert rows is not None
+        found = point_partials(self.camera, points, finite)
+        return np.asarray(found[:, :, :-6] + found[:, :, -6:] @ rows)
+
+    def sees(self, pixels: Floats) -> Bools:
+        """Return (n,) whether pixels are in the observed board region, if known."""
+        return ~outside(pixels, hull(self.corners)) if len(self.corners) else np.ones(len(pixels), dtype=bool)
 
 
-def _inverted(covariances: Floats) -> Floats:
-    known = np.isfinite(covariances).all(axis=(1, 2))
-    found = np.full_like(covariances, np.nan)
-    found[known] = np.linalg.inv(covariances[known])
-    return found
+def _side(given: object, camera: int | str, name: str) -> Side:
+    if isinstance(given, Camera):
+        return Side(given.name or name, given)
+    if not isinstance(given, Calibrated):
+        raise InputError(phrase("targets.no-calibration", name=name, value=value_field(given)))
+    number = camera_number(given, camera)
+    housing, own = housing_of(given, number)
+    columns = housing.parameters(own)
+    return Side(
+        name=f"{given.cameras[number].name} of {name}",
+        camera=housing.cameras[own],
+        corners=housing.seen.xy[housing.seen.cameras == own],
+        covariance=housing.variance * housing.cofactors[columns, columns],
+        rows=datum_rows(housing, own, "corners")[:, columns],
+    )
 
 
-class _Expected:
-    """Expected difference in the datum of the fit, with the motion removed from both."""
-
-    def __init__(
-        self, a: Side, b: Side, fitted: Fitted, pixels: Floats, distances: tuple[float, ...]
-    ) -> None:
-        self.a, self.b, self.fitted = a, b, fitted
-        points = points_at(a.camera, pixels, distances)
-        weights = _weights(a, b, pixels, distances, "pixels")
-        moved = transformed(fitted.motion, points)
-        usable = np.isfinite(weights).all(axis=(1, 2)) & np.isfinite(imaged(b.camera, moved).xy).all(axis=1)
-        self.rows = [
-            fixed_points(side.camera, each[usable], weights[usable], fitted.finite)
-            for side, each in ((a, points), (b, moved))
-        ]
-
-    def covariances(self, pixels: Floats, distances: tuple[float, ...]) -> Floats:
-        """Return (D, n, 2, 2) Q_a + Q_b."""
-        found = []
-        for each in distances:
-            finite = bool(np.isfinite(each))
-            points = points_at(self.a.camera, pixels, [each])
-            own = self.a.covariances(points, finite, self.rows[0])
-            moved = transformed(self.fitted.motion, points)
-            found.append(own + self.b.covariances(moved, finite, self.rows[1]))
-        return np.stack(found)
-
-    def test(self, size: tuple[int, int], distances: tuple[float, ...]) -> DifferenceTest:
-        """Test parameters jointly for equal models, else differences over a grid."""
-        a, b = self.a, self.b
-        assert a.covariance is not None
-        assert b.covariance is not None
-        unknown = unknown_of(a.camera)
-        if a.camera.model == b.camera.model and np.array_equal(unknown, unknown_of(b.camera)):
-            change = (values_of(b.camera) - values_of(a.camera))[unknown]
-            chi2 = float(change @ np.linalg.solve(a.covariance + b.covariance, change))
-            return DifferenceTest.of("parameters of both cameras", chi2, len(change))
-        pixels = image_grid(size, TEST_GRID)[2]
-        pixels = pixels[a.sees(pixels)]
-        vectors, effects = [], []
-        for each in distances:
-            finite = bool(np.isfinite(each))
-            points = points_at(a.camera, pixels, [each])
-            own = [
-                side.partials(places, finite, rows) @ _root(side.covariance)
-                for side, places, rows in zip(
-                    (a, b), (points, transformed(self.fitted.motion, points)), self.rows, strict=True
-                )
-            ]
-            effects.append(np.concatenate(own, axis=2))
-            vectors.append(differences_at(a.camera, b.camera, self.fitted, pixels, each))
-        return _tested(np.concatenate(vectors), np.concatenate(effects))
+def _finite(distances: Sequence[float], pixels: Floats) -> Bools:
+    """Return (D n,) whether the points of :func:`points_at` are at finite distances."""
+    return np.repeat(np.isfinite(distances), len(pixels))
 
 
-def _tested(vectors: Floats, effects: Floats) -> DifferenceTest:
-    """Test (n, 2) vectors with F (n, 2, r) of the covariance F F' of rank at most r."""
-    known = np.isfinite(vectors).all(axis=1) & np.isfinite(effects).all(axis=(1, 2))
-    u, s, _ = np.linalg.svd(effects[known].reshape(-1, effects.shape[2]), full_matrices=False)
+def differences_at(
+    a: Camera, b: Camera, fitted: Fitted, pixels: Floats, distances: Sequence[float]
+) -> Floats:
+    """Return (D n, 2) d(q) at (n, 2) pixels of camera a; NaN if not visible in both."""
+    points = transformed(fitted.motion, points_at(a, pixels, distances))
+    return np.asarray(imaged(b, points).xy - np.tile(pixels, (len(distances), 1)))
+
+
+def _test(
+    a: Side, b: Side, size: tuple[int, int], distances: Sequence[float], fitted: Fitted, datums: list[Floats]
+) -> DifferenceTest:
+    """Test parameters jointly for equal models, else differences over a grid."""
+    assert a.covariance is not None
+    assert b.covariance is not None
+    unknown = unknown_of(a.camera)
+    if a.camera.model == b.camera.model and np.array_equal(unknown, unknown_of(b.camera)):
+        change = (values_of(b.camera) - values_of(a.camera))[unknown]
+        chi2 = float(change @ np.linalg.solve(a.covariance + b.covariance, change))
+        return DifferenceTest.of("parameters of both cameras", chi2, len(change))
+    pixels = image_grid(size, TEST_GRID)[2]
+    pixels = pixels[a.sees(pixels)]
+    points = points_at(a.camera, pixels, distances)
+    # F (n, 2, r) of the covariance F F' of rank at most r
+    effects = []
+    for side, each, datum in zip((a, b), (points, transformed(fitted.motion, points)), datums, strict=True):
+        assert side.covariance is not None
+        values, axes = np.linalg.eigh(side.covariance)
+        root = axes * np.sqrt(np.maximum(values, 0.0))
+        effects.append(side.partials(each, _finite(distances, pixels), datum) @ root)
+    both, vectors = (
+        np.concatenate(effects, axis=2),
+        differences_at(a.camera, b.camera, fitted, pixels, distances),
+    )
+    known = np.isfinite(vectors).all(axis=1) & np.isfinite(both).all(axis=(1, 2))
+    u, s, _ = np.linalg.svd(both[known].reshape(-1, both.shape[2]), full_matrices=False)
     defined = s > RANK_TOLERANCE * s[0]
     chi2 = float((((u.T @ vectors[known].ravel())[defined] / s[defined]) ** 2).sum())
     return DifferenceTest.of("differences over the picture", chi2, int(np.count_nonzero(defined)))
-
-
-def _root(covariance: Floats | None) -> Floats:
-    assert covariance is not None
-    values, vectors = np.linalg.eigh(covariance)
-    return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0)))
-
-
-Criterion = Literal["pixels", "mrcal"]  # squares of pixel differences, or mrcal 2: fourth powers of angles
-
-STEPS = 200
-TOLERANCE = 1e-11  # relative to radians and the shortest distance
-MIN_PIXELS = 10
-HUBER_THETA_SQUARED = np.radians(5.0) ** 2  # the criterion of mrcal increases more slowly beyond
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """Fitted motion between the axes of two cameras."""
-
-    motion: Floats  # (4, 4) axes of camera a -> axes of camera b; without translation unless finite
-    finite: bool  # whether the translation was fitted: all distances are finite
-    points: int  # number of pixels of the fit, counted at every distance
-
-
-def points_at(camera: Camera, pixels: Floats, distances: Sequence[float]) -> Floats:
-    """Return (D n, 3) points on pixel rays at each distance; directions at infinity."""
-    towards = rays(camera, pixels)
-    return np.concatenate([towards * (each if np.isfinite(each) else 1.0) for each in distances])
-
-
-def differences_at(a: Camera, b: Camera, fitted: Fitted, pixels: Floats, distance: float) -> Floats:
-    """Return (n, 2) d(q) at (n, 2) pixels of camera a; NaN if not visible in both."""
-    points = points_at(a, pixels, [distance])
-    return np.asarray(imaged(b, transformed(fitted.motion, points)).xy - pixels)
-
-
-def fitted_motion(
-    a: Camera,
-    b: Camera,
-    pixels: Floats,
-    distances: Sequence[float],
-    criterion: Criterion = "pixels",
-    weights: Floats | None = None,
-) -> Fitted:
-    """Return the motion that minimises the differences at (n, 2) pixels of camera a.
-
-    Pixels that are not visible in both are ignored. A translation is fitted if all distances are finite; with
-    one distance it is arbitrary along the rays. Weights of each pixel are ordered by distance: (D n, 2, 2) W
-    of pixel differences, or (D n,) w of the mrcal criterion. NaN excludes a pixel, None means equal weights.
-    """
-    finite = bool(np.isfinite(distances).all())
-    towards = points_at(a, pixels, distances)
-    aims, places = (np.concatenate([each] * len(distances)) for each in (rays(b, pixels), pixels))
-    if weights is None:
-        weights = np.tile(np.eye(2), (len(towards), 1, 1)) if criterion == "pixels" else np.ones(len(towards))
-    numbers = np.column_stack([towards, aims, weights.reshape(len(towards), -1)])
-    usable = np.isfinite(numbers).all(axis=1)
-    if (count := int(np.count_nonzero(usable))) < MIN_PIXELS:
-        raise InputError(phrase("targets.few-pixels", count=count, least=MIN_PIXELS))
-    towards, aims, places, weights = towards[usable], aims[usable], places[usable], weights[usable]
-    motion, free = np.eye(4), slice(0 if finite else 3, 6)
-    unit = towards / np.linalg.norm(towards, axis=1)[:, np.newaxis]
-    motion[:3, :3] = nearest_rotations((aims.T @ unit)[np.newaxis])[0]
-    if criterion == "pixels":
-        known = np.isfinite(imaged(b, transformed(motion, towards)).xy).all(axis=1)
-        roots = np.linalg.cholesky(weights[known]).transpose(0, 2, 1)
-        shown = Points(towards[known], places[known], finite, roots)
-        return Fitted(shown.least(Moved(b, motion), [], free).motion, finite, count)
-    for _ in range(STEPS):
-        moved = transformed(motion, towards)
-        by_motion = motion_partials(moved, finite)[:, :, free]
-        step = np.zeros(6)
-        step[free] = np.linalg.solve(*_angle_step(moved, aims, weights**2, by_motion))
-        motion = moved_by(motion, step)
-        if np.abs(step[3:]).max() < TOLERANCE and np.abs(step[:3]).max() < TOLERANCE * np.min(distances):
-            break
-    return Fitted(motion, finite, count)
-
-
-def _angle_step(moved: Floats, aims: Floats, weights: Floats, by_motion: Floats) -> tuple[Floats, Floats]:
-    """Return Newton's equations of sum w^2 rho(theta^4), theta^2 = |u - v|^2.
-
-    For unit vectors u, v with e = theta^2 and D = du, the gradient of e^2 is 4 e D' (u - v). Its second
-    derivatives are 8 (D' (u - v))^2 + 4 e D' D, without the curvature of u. Huber: beyond k, e^2 becomes 2 k
-    |e| - k^2.
-    """
-    length = np.linalg.norm(moved, axis=1)
-    unit = moved / length[:, np.newaxis]
-    across = (np.eye(3) - unit[:, :, np.newaxis] * unit[:, np.newaxis]) / length[:, np.newaxis, np.newaxis]
-    turned = across @ by_motion
-    apart = unit - aims
-    e = (apart**2).sum(axis=1)
-    slope = np.einsum("nij,ni->nj", turned, apart)
-    inside = e < HUBER_THETA_SQUARED
-    level = weights * np.where(inside, e, HUBER_THETA_SQUARED)
-    normal = 2 * np.einsum("n,ni,nj->ij", weights * inside, slope, slope)
-    normal += np.einsum("n,nki,nkj->ij", level, turned, turned)
-    return normal, -np.einsum("n,ni->i", level, slope)

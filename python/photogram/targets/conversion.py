@@ -22,11 +22,12 @@ from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Section
 from photogram.show.quantity import Axis, Quantity, Table, members
 from photogram.summaries import Rows
-from photogram.targets.calibration_difference import CameraDifference, Fitted, motion_of, points_at
+from photogram.targets.calibration_difference import CameraDifference, motion_of
 from photogram.targets.lens_fit import (
     GRID,
     KNOTS,
     NO_MOTION,
+    Fitted,
     Moved,
     Points,
     fitted_in_stages,
@@ -35,9 +36,9 @@ from photogram.targets.lens_fit import (
     shows,
     within,
 )
-from photogram.targets.maps import at_distance, image_grid
 from photogram.targets.output import Rig
-from photogram.targets.vision import TURNED, names_of
+from photogram.targets.uncertainty import at_distance, image_grid
+from photogram.targets.vision import TURNED, names_of, points_at
 from photogram.words import phrase
 
 MIN_RELATIVE_VARIANCE = 1e-2  # added to each covariance to limit the weight of a pixel

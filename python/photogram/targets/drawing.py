@@ -16,7 +16,7 @@ from photogram.show.style import BLUE, FAINT, INK, VERMILION, round_length
 from photogram.targets.calibration_difference import CameraDifference
 from photogram.targets.cross_validation import CrossValidation
 from photogram.targets.grouping import CRITICAL_TEST_VALUE, group_statistics, outlying_images
-from photogram.targets.maps import UncertaintyCurve, UncertaintyMap, distance_text
+from photogram.targets.uncertainty import UncertaintyCurve, UncertaintyMap, at_distance
 
 if TYPE_CHECKING:
     from photogram.targets import Calibrated
@@ -76,7 +76,7 @@ def plot_uncertainty_curve(found: UncertaintyCurve) -> Plot:
         line = np.column_stack([across, np.full(2, each)])
         marks.append(Line(line, INK, 0.9, "--", label=f"at infinity {each:.2g} px"))
     if math.isfinite(distance):
-        least = f"least {sd:.2g} px {distance_text(float(f'{distance:.3g}'), found.unit)}"
+        least = f"least {sd:.2g} px {at_distance(float(f'{distance:.3g}'), found.unit)}"
         marks.append(Markers(np.array([[distance, sd]]), "o", 6.0, VERMILION, VERMILION, label=least))
     column, row = found.pixel
     title = (
@@ -110,7 +110,7 @@ def plot_difference(found: CameraDifference) -> Plot:
     panels = list[Panel]()
     for number, distance in enumerate(found.distances):
         own = _Apart(found.size, found.columns, found.rows, found.vectors[number], found.inside)
-        panels.append(own.panel(f"{names} {distance_text(distance, found.unit)}, px"))
+        panels.append(own.panel(f"{names} {at_distance(distance, found.unit)}, px"))
         if found.chi2 is not None:
             panels.append(own.beside(found.chi2[number]))
     rows = len(found.distances)
@@ -132,7 +132,7 @@ def plot_cross_validation(cross: CrossValidation, over: UncertaintyMap) -> Plot:
     found = cross.map(cross.cameras.index(over.camera), over.pixels.reshape(-1, 2), over.distance)
     shape = over.sd.shape
     own = _Apart(over.size, over.columns, over.rows, found.differences.reshape(*shape, 2), over.inside)
-    away = distance_text(over.distance, over.unit)
+    away = at_distance(over.distance, over.unit)
     left = own.panel(f"{over.camera}: second part of the views less the first, {away}, px")
     panels = [replace(left, notes=[cross.verdict]), own.beside(found.chi2.reshape(shape) / 2)]
     return Plot(2 * WIDTH_INCHES, _height(over.size), panels, 2)

@@ -16,15 +16,15 @@ from photogram.network.knots import KNOTTED
 from photogram.results.result import Result
 from photogram.statistics.findings import Findings, Systematic
 from photogram.statistics.weight_rules import LARGEST_FACTOR
-from photogram.targets.cross_validation import MIN_PROBABILITY, CrossValidation
+from photogram.targets.calibration_difference import MIN_PROBABILITY
 from photogram.targets.first_camera import WIDEST, from_axis
 from photogram.targets.housing import middle_of
-from photogram.targets.maps import PARTS, distance_text, parts_of
+from photogram.targets.uncertainty import PARTS, at_distance, parts_of
 from photogram.targets.vision import rays
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
-    from photogram.targets import Calibrated
+    from photogram.targets import Calibrated, CrossValidation
 
 MIN_TILT_DEG, MIN_TILTED_VIEWS = 15.0, 3  # separate focal length and distance
 MIN_DISTANCE_RATIO = 1.3  # ratio of farthest and nearest view
@@ -109,7 +109,7 @@ def calibration_findings(calibrated: Calibrated, found: Findings) -> Findings:
     worth, need, shortfall = calibrated.worth, calibrated.need, found.shortfall
     if worth is not None and need is not None and not worth.largest <= need:
         worst = max(worth.maps, key=lambda found: found.largest)
-        distance = distance_text(worst.distance, worst.unit)
+        distance = at_distance(worst.distance, worst.unit)
         fields = {"camera": worst.camera, "sd": worst.largest, "distance": distance, "need": need}
         shortfall = phrase("verdict.not-accurate-enough", **fields)
     shown = showings(calibrated)

@@ -1,23 +1,40 @@
-"""Calibrated cameras of one housing: values, cofactors, and observed corners.
+"""Calibrated cameras of one housing: values, cofactors, observed corners, and projection uncertainty.
 
 Uncertainty maps, differences, new views and triangulation are computed from these arrays. Steps are R <-
 Exp(w) R, t <- t + dt.
+
+Projections are of points fixed to the housing. Let K and Pi be the partials of the image point by the camera
+parameters k and by the point p = d r(q). With G = (I, -[p]x),  dq = K dk + Pi G tau,  Q_q = J Q J'.  A
+calibration moves its own axes. The datum is a matrix T. It defines the motion tau = T db, (dt, w), of the
+camera axes for a change db of the unknowns.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.arrays import one_of
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import unknown_name
 from photogram.network.cameras import Camera
-from photogram.targets.vision import cross_matrices, imaged, motion_partials, sensor_steps, unknown_of
+from photogram.targets.options import DatumName
+from photogram.targets.vision import (
+    cross_matrices,
+    has_unknown_knots,
+    imaged,
+    motion_partials,
+    points_at,
+    sensor_steps,
+    touched,
+    transformed,
+    unknown_of,
+)
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -123,11 +140,6 @@ class Housing:
 def middle_of(points: Floats) -> Floats:
     """Return the centre (3,) of (n, 3) points of a board."""
     return np.asarray((points.max(axis=0) + points.min(axis=0)) / 2)
-
-
-def transformed(poses: Floats, points: Floats) -> Floats:
-    """Transform (n, 3) points by one pose (4, 4), or by one each (n, 4, 4)."""
-    return np.asarray(np.einsum("...ij,...j->...i", poses[..., :3, :3], points) + poses[..., :3, 3])
 
 
 def mean_motion(poses: Sequence[Floats] | Floats) -> Floats:
@@ -274,3 +286,151 @@ def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
         found[start : start + len(own), start : start + len(own)] = own
         start += len(own)
     return found
+
+
+POINTS_PER_BATCH = 4096
+
+
+def datum_rows(
+    housing: Housing, camera: int, datum: DatumName, fixed: tuple[Floats, Floats, bool] | None = None
+) -> Floats:
+    """Return (6, c + 6) T of a camera by the name of a datum.
+
+    For `image`, `fixed` contains (n, 3) fixed points in camera axes, their (n, 2, 2) weights W, and whether
+    they are at finite distances.
+    """
+    one_of("datum", datum, get_args(DatumName))
+    found = np.zeros((6, housing.common + 6))
+    own = housing.parameters(camera)
+    if datum == "corners":
+        if camera not in (fixing := housing.fixing_corners):
+            places, sd = housing.places(camera)
+            weights = np.eye(2) / sd[:, np.newaxis, np.newaxis] ** 2
+            fixing[camera] = fixed_points(housing.cameras[camera], places, weights)
+        found[:, own] = fixing[camera]
+    elif datum == "image" and fixed is not None:
+        found[:, own] = fixed_points(housing.cameras[camera], *fixed)
+    elif datum == "mean-frames":
+        turn, shift = housing.sensors[camera, :3, :3], housing.sensors[camera, :3, 3]
+        # p' = R p + t:  R (dt + w x p) + dt_s + w_s x R p  with R p = p' - t.
+        about = np.eye(6)
+        about[:3, 3:] = cross_matrices(shift)
+        found[:, housing.mean_motion] = about @ np.kron(np.eye(2), turn)
+        if camera:
+            found[:, housing.sensor(camera)] = about
+    return found
+
+
+def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool = True) -> Floats:
+    """Return (6, p) T that minimises image shifts of points for parameter changes.
+
+    T = -(sum G' Pi' W Pi G)^-1 sum G' Pi' W K. The (n, 3) points are in camera axes, W are their (n, 2, 2)
+    image weights. The translation is omitted for points at infinity, if not `finite`.
+    """
+    normal, right = np.zeros((6, 6)), np.zeros((6, np.count_nonzero(unknown_of(camera))))
+    for start in range(0, len(points), POINTS_PER_BATCH):
+        part = slice(start, start + POINTS_PER_BATCH)
+        images = (touched if has_unknown_knots(camera) else imaged)(camera, points[part])
+        by_motion = images.by_point @ motion_partials(points[part], finite)
+        weighted = weights[part] @ by_motion
+        normal += weighted.reshape(-1, 6).T @ by_motion.reshape(-1, 6)
+        if images.columns is not None:
+            products = weighted.transpose(0, 2, 1) @ images.by_parameters
+            columns = images.columns.ravel()
+            for row, own in enumerate(right):
+                own += np.bincount(columns, products[:, row].ravel(), minlength=len(own))
+        else:
+            right += weighted.reshape(-1, 6).T @ images.by_parameters.reshape(2 * len(weighted), -1)
+    return _moved_back(normal, right, finite)
+
+
+def housing_rows(housing: Housing) -> Floats:
+    """Return (6, c + 6) T_rig: the motion of camera 0 that fixes the corners of all."""
+    normal, right = np.zeros((6, 6)), np.zeros((6, housing.common + 6))
+    for number, camera in enumerate(housing.cameras):
+        places, sd = housing.places(number)
+        turn, shift = housing.sensors[number, :3, :3], housing.sensors[number, :3, 3]
+        for start in range(0, len(places), POINTS_PER_BATCH):
+            part = slice(start, start + POINTS_PER_BATCH)
+            images = imaged(camera, places[part])
+            by_point = images.by_point / sd[part, np.newaxis, np.newaxis]
+            turned = places[part] - shift  # R_s p
+            by_motion = (by_point @ turn @ motion_partials(turned @ turn)).reshape(-1, 6)
+            normal += by_motion.T @ by_motion
+            own = images.by_parameters / sd[part, np.newaxis, np.newaxis]
+            right[:, housing.parameters(number)] += by_motion.T @ own.reshape(len(by_motion), -1)
+            if number:
+                by_sensor = (by_point @ motion_partials(turned)).reshape(-1, 6)
+                right[:, housing.sensor(number)] += by_motion.T @ by_sensor
+    return _moved_back(normal, right, True)
+
+
+def _moved_back(normal: Floats, right: Floats, finite: bool) -> Floats:
+    """Return -N^-1 B, without translation for points at infinity."""
+    found = np.zeros_like(right)
+    free = slice(0 if finite else 3, 6)
+    found[free] = -np.linalg.solve(normal[free, free], right[free])
+    return found
+
+
+PIXELS_PER_BATCH = 2048
+
+
+def projection_cofactors(
+    housing: Housing, camera: int, pixels: Floats, distance: float, rows: Floats
+) -> Floats:
+    """Return (n, 2, 2) cofactors of projections at (n, 2) pixels; NaN if undefined.
+
+    The distance is from the centre of this camera, infinite for directions; `rows` are (6, c + 6) of the
+    datum (:func:`datum_rows`).
+    """
+    own, unknowns, moved = housing.cameras[camera], housing.parameters(camera), rows @ housing.cofactors
+    across = moved[:, unknowns]  # of the axis motion and the camera parameters
+    cofactors = np.block([[housing.cofactors[unknowns, unknowns], across.T], [across, moved @ rows.T]])
+    finite, found = bool(np.isfinite(distance)), np.empty((len(pixels), 2, 2))
+    for start in range(0, len(pixels), PIXELS_PER_BATCH):
+        part = slice(start, start + PIXELS_PER_BATCH)
+        points = points_at(own, pixels[part], [distance])
+        if not has_unknown_knots(own):
+            found[part] = of_functions(point_partials(own, points, finite), cofactors)
+            continue
+        images = touched(own, points)
+        assert images.columns is not None
+        motion = np.broadcast_to(np.arange(len(cofactors) - 6, len(cofactors)), (len(points), 6))
+        columns = np.hstack([images.columns, motion])
+        partials = np.concatenate(
+            [images.by_parameters, images.by_point @ motion_partials(points, finite)], 2
+        )
+        touching = cofactors[columns[:, :, np.newaxis], columns[:, np.newaxis]]
+        found[part] = partials @ touching @ partials.transpose(0, 2, 1)
+    return found
+
+
+def common_partials(housing: Housing, camera: int, pixels: Floats, distance: float, rows: Floats) -> Floats:
+    """Return (n, 2, c) J by the common unknowns, in a datum independent of views."""
+    own = housing.cameras[camera]
+    partials = point_partials(own, points_at(own, pixels, [distance]), bool(np.isfinite(distance)))
+    found = partials[:, :, -6:] @ rows[:, : housing.common]
+    found[:, :, housing.parameters(camera)] += partials[:, :, :-6]
+    return np.asarray(found)
+
+
+def point_partials(camera: Camera, points: Floats, finite: bool | Bools) -> Floats:
+    """Return (n, 2, p + 6) J = (K, Pi G) of (n, 3) points or directions."""
+    images = imaged(camera, points)
+    return np.concatenate([images.by_parameters, images.by_point @ motion_partials(points, finite)], axis=2)
+
+
+def of_functions(partials: Floats, cofactors: Floats) -> Floats:
+    """Return (n, 2, 2) J Q J' of (n, 2, u) partials."""
+    whole = (partials.reshape(-1, partials.shape[2]) @ cofactors).reshape(partials.shape)
+    return np.asarray(whole @ partials.transpose(0, 2, 1))
+
+
+def worst(covariances: Floats) -> Floats:
+    """Return (n,) worst-direction standard deviations of (n, 2, 2) covariances.
+
+    sqrt((a + c)/2 + sqrt(((a - c)/2)^2 + b^2)) of [a b; b c].
+    """
+    a, b, c = covariances[:, 0, 0], covariances[:, 0, 1], covariances[:, 1, 1]
+    return np.asarray(np.sqrt((a + c) / 2 + np.hypot((a - c) / 2, b)))

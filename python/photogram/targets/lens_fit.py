@@ -1,6 +1,6 @@
 """Least-squares fit of another lens model to the projections of a camera, over pixels.
 
-The motion of its axes may be fitted with it.
+The motion of its axes may be fitted with it, or alone for the comparison of two cameras.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from itertools import compress
 from types import MappingProxyType
-from typing import Self
+from typing import Literal, Self
 
 import numpy as np
 
@@ -20,9 +20,20 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import unknown_name
 from photogram.network.cameras import Camera
 from photogram.network.knots import KNOTTED
-from photogram.targets.housing import transformed
-from photogram.targets.maps import image_grid
-from photogram.targets.vision import TURNED, motion_partials, moved_by, names_of, rays, unknown_of, values_of
+from photogram.targets.sightings import nearest_rotations
+from photogram.targets.uncertainty import image_grid
+from photogram.targets.vision import (
+    TURNED,
+    imaged,
+    motion_partials,
+    moved_by,
+    names_of,
+    points_at,
+    rays,
+    transformed,
+    unknown_of,
+    values_of,
+)
 from photogram.words import phrase
 
 MAX_STEPS, TOLERANCE, SPLINE_TOLERANCE = 100, 1e-10, 1e-6  # relative decrease of the sum of squares
@@ -265,3 +276,85 @@ def fitted_in_stages(start: Moved, points: Points, free: Sequence[str], moving: 
     if moving != NO_MOTION:
         at = points.least(at, [numbers[name] for name in free], moving)
     return at
+
+
+Criterion = Literal["pixels", "mrcal"]  # squares of pixel differences, or mrcal 2: fourth powers of angles
+
+MOTION_STEPS = 200
+MOTION_TOLERANCE = 1e-11  # relative to radians and the shortest distance
+MIN_PIXELS = 10
+HUBER_THETA_SQUARED = np.radians(5.0) ** 2  # the criterion of mrcal increases more slowly beyond
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Fitted motion between the axes of two cameras."""
+
+    motion: Floats  # (4, 4) axes of camera a -> axes of camera b; without translation unless finite
+    finite: bool  # whether the translation was fitted: all distances are finite
+    points: int  # number of pixels of the fit, counted at every distance
+
+
+def fitted_motion(
+    a: Camera,
+    b: Camera,
+    pixels: Floats,
+    distances: Sequence[float],
+    criterion: Criterion = "pixels",
+    weights: Floats | None = None,
+) -> Fitted:
+    """Return the motion that minimises the differences at (n, 2) pixels of camera a.
+
+    Pixels that are not visible in both are ignored. A translation is fitted if all distances are finite; with
+    one distance it is arbitrary along the rays. Weights of each pixel are ordered by distance: (D n, 2, 2) W
+    of pixel differences, or (D n,) w of the mrcal criterion. NaN excludes a pixel, None means equal weights.
+    """
+    finite = bool(np.isfinite(distances).all())
+    towards = points_at(a, pixels, distances)
+    aims, places = (np.concatenate([each] * len(distances)) for each in (rays(b, pixels), pixels))
+    if weights is None:
+        weights = np.tile(np.eye(2), (len(towards), 1, 1)) if criterion == "pixels" else np.ones(len(towards))
+    numbers = np.column_stack([towards, aims, weights.reshape(len(towards), -1)])
+    usable = np.isfinite(numbers).all(axis=1)
+    if (count := int(np.count_nonzero(usable))) < MIN_PIXELS:
+        raise InputError(phrase("targets.few-pixels", count=count, least=MIN_PIXELS))
+    towards, aims, places, weights = towards[usable], aims[usable], places[usable], weights[usable]
+    motion, free = np.eye(4), slice(0 if finite else 3, 6)
+    unit = towards / np.linalg.norm(towards, axis=1)[:, np.newaxis]
+    motion[:3, :3] = nearest_rotations((aims.T @ unit)[np.newaxis])[0]
+    if criterion == "pixels":
+        known = np.isfinite(imaged(b, transformed(motion, towards)).xy).all(axis=1)
+        roots = np.linalg.cholesky(weights[known]).transpose(0, 2, 1)
+        shown = Points(towards[known], places[known], finite, roots)
+        return Fitted(shown.least(Moved(b, motion), [], free).motion, finite, count)
+    for _ in range(MOTION_STEPS):
+        moved = transformed(motion, towards)
+        by_motion = motion_partials(moved, finite)[:, :, free]
+        step = np.zeros(6)
+        step[free] = np.linalg.solve(*_angle_step(moved, aims, weights**2, by_motion))
+        motion = moved_by(motion, step)
+        turn, shift = np.abs(step[3:]).max(), np.abs(step[:3]).max()
+        if turn < MOTION_TOLERANCE and shift < MOTION_TOLERANCE * np.min(distances):
+            break
+    return Fitted(motion, finite, count)
+
+
+def _angle_step(moved: Floats, aims: Floats, weights: Floats, by_motion: Floats) -> tuple[Floats, Floats]:
+    """Return Newton's equations of sum w^2 rho(theta^4), theta^2 = |u - v|^2.
+
+    For unit vectors u, v with e = theta^2 and D = du, the gradient of e^2 is 4 e D' (u - v). Its second
+    derivatives are 8 (D' (u - v))^2 + 4 e D' D, without the curvature of u. Huber: beyond k, e^2 becomes 2 k
+    |e| - k^2.
+    """
+    length = np.linalg.norm(moved, axis=1)
+    unit = moved / length[:, np.newaxis]
+    across = (np.eye(3) - unit[:, :, np.newaxis] * unit[:, np.newaxis]) / length[:, np.newaxis, np.newaxis]
+    turned = across @ by_motion
+    apart = unit - aims
+    e = (apart**2).sum(axis=1)
+    slope = np.einsum("nij,ni->nj", turned, apart)
+    inside = e < HUBER_THETA_SQUARED
+    level = weights * np.where(inside, e, HUBER_THETA_SQUARED)
+    normal = 2 * np.einsum("n,ni,nj->ij", weights * inside, slope, slope)
+    normal += np.einsum("n,nki,nkj->ij", level, turned, turned)
+    return normal, -np.einsum("n,ni->i", level, slope)

@@ -32,9 +32,9 @@ from photogram.targets.calibration import Calibration
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corner_files import KEY
 from photogram.targets.corners import Corners
-from photogram.targets.maps import UncertaintyMap
 from photogram.targets.npz_arrays import Arrays, read_arrays
 from photogram.targets.output import Rig
+from photogram.targets.uncertainty import UncertaintyMap
 from photogram.targets.vision import inverted, of_vectors
 from photogram.words import phrase
 

@@ -30,16 +30,17 @@ from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import (
     Housing,
     camera_number,
+    common_partials,
+    datum_rows,
     housed_with,
     housing_of,
     middle_of,
+    of_functions,
     size_of,
-    transformed,
+    worst,
 )
-from photogram.targets.maps import at_distance, image_grid, parts_of
-from photogram.targets.projection import common_partials, datum_rows, of_functions, worst
-from photogram.targets.uncertainty import checked_distance
-from photogram.targets.vision import TURNED, composed, inverted, motion_partials, rays
+from photogram.targets.uncertainty import at_distance, checked_distance, image_grid, parts_of
+from photogram.targets.vision import TURNED, composed, inverted, motion_partials, rays, transformed
 from photogram.words import phrase
 
 MIN_CORNERS_PER_PICTURE = 12

@@ -25,10 +25,9 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import meet_rays
 from photogram.targets.calibration_result import Calibrated
-from photogram.targets.housing import Housing, camera_number, housed_with, housing_of, size_of, transformed
-from photogram.targets.maps import image_grid
-from photogram.targets.projection import housing_rows
-from photogram.targets.vision import imaged, motion_partials, photo_poses, rays
+from photogram.targets.housing import Housing, camera_number, housed_with, housing_of, housing_rows, size_of
+from photogram.targets.uncertainty import image_grid
+from photogram.targets.vision import imaged, motion_partials, photo_poses, rays, transformed
 from photogram.words import phrase
 
 TOLERANCE = 1e-9  # in standard deviations of a point

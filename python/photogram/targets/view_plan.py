@@ -22,15 +22,13 @@ from photogram.show.sketch.marks import Mark, Markers, Panel, Polygons, boxes
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, VERMILION
 from photogram.summaries import Rows
-from photogram.targets.appraisal import Worth, median_distance
 from photogram.targets.board import Board
 from photogram.targets.calibration import Calibration
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corners import Corners
+from photogram.targets.cross_validation import Worth, median_distance
 from photogram.targets.drawing import in_pixels
 from photogram.targets.first_calibration import weakly_known
-from photogram.targets.housing import transformed
-from photogram.targets.maps import UncertaintyMap, at_distance
 from photogram.targets.new_views import (
     GRID,
     TILTS,
@@ -44,8 +42,8 @@ from photogram.targets.new_views import (
 )
 from photogram.targets.page import drawings, worth_facts, worth_members
 from photogram.targets.regularisation import weighted_block
-from photogram.targets.uncertainty import checked_distance, uncertainty_map
-from photogram.targets.vision import rays
+from photogram.targets.uncertainty import UncertaintyMap, at_distance, checked_distance, uncertainty_map
+from photogram.targets.vision import rays, transformed
 from photogram.words import phrase
 
 BOARD_OF_PICTURE = (0.9, 0.6, 0.4)  # ratio of the longer side of the board and the shorter side of the image

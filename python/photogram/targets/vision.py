@@ -6,6 +6,8 @@ have A = R'F and C = -R't, with F = diag(1, -1, -1). Steps of a pose are R <- Ex
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from photogram import _photocore
@@ -45,6 +47,11 @@ def inverted(pose: Floats) -> Floats:
     """Return the inverse (4, 4) of a pose: [R' -R't; 0 1]."""
     turned = pose[:3, :3].T
     return composed(turned, -turned @ pose[:3, 3])
+
+
+def transformed(poses: Floats, points: Floats) -> Floats:
+    """Transform (n, 3) points by one pose (4, 4), or by one each (n, 4, 4)."""
+    return np.asarray(np.einsum("...ij,...j->...i", poses[..., :3, :3], points) + poses[..., :3, 3])
 
 
 def sensor_pose(position: Floats, attitude: Floats) -> Floats:
@@ -163,10 +170,16 @@ def rays(camera: Camera, pixels: Floats) -> Floats:
     return np.asarray(camera.rays(pixels) * TURNED)
 
 
-def motion_partials(points: Floats, finite: bool = True) -> Floats:
+def points_at(camera: Camera, pixels: Floats, distances: Sequence[float]) -> Floats:
+    """Return (D n, 3) points on pixel rays at each distance; directions at infinity."""
+    towards = rays(camera, pixels)
+    return np.concatenate([towards * (each if np.isfinite(each) else 1.0) for each in distances])
+
+
+def motion_partials(points: Floats, finite: bool | Bools = True) -> Floats:
     """Return (n, 3, 6) G = (I, -[p]x), the effect of a motion (dt, w) on points.
 
     Points at infinity, which are directions, are not affected by the translation.
     """
-    by_translation = np.broadcast_to(np.eye(3) if finite else np.zeros((3, 3)), (len(points), 3, 3))
+    by_translation = np.broadcast_to(np.eye(3) * np.reshape(finite, (-1, 1, 1)), (len(points), 3, 3))
     return np.concatenate([by_translation, -cross_matrices(points)], axis=2)
