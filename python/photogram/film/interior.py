@@ -194,21 +194,67 @@ def interior_orientation(
     if mirrored is not None and found is not None and found != mirrored:
         raise ContradictionError(mirror_message(mirrored, side_residuals(q, true)))
     side = bool(found if mirrored is None else mirrored)
-    fit = _Fit(
-        q,
-        xy,
-        variances.ravel(),
-        names,
-        own,
-        machine,
-        curves,
-        mirrored=side,
-        projective=model == "projective",
-        reseau=reseau,
-    )
-    values = np.zeros(8 if reseau is None else 8 + 2 * len(reseau.weights))
+    nodes = 0 if reseau is None else len(reseau.weights)
+    known, rows, size = len(names), xy.size, np.abs(q).max()
+    values = np.zeros(8 + 2 * nodes)
     values[:4] = conformal(q, true, mirrored=side)
-    return fit.adjusted(model, values)
+    columns = [*range(known), *range(8, len(values))]
+    # Movements of a mark at the edge per unit of each unknown
+    moves = np.array([1.0, 1.0, *[size] * 4, *[size**2] * 2, *np.ones(2 * nodes)])[columns]
+    covariance = np.diag(np.concatenate([variances.ravel(), np.ones(2 * nodes)]))
+    if reseau is not None:
+        covariance[rows:, rows:] = reseau.covariance
+    for _ in range(_MAX_STEPS):
+        film = Film(
+            FilmPlacement("p", values[:3]),
+            FilmSize("p", values[3:6]),
+            machine,
+            own,
+            bend=FilmBend("p", values[6:8]) if known > 6 else None,
+            projective=model == "projective",
+            curves=curves,
+            mirrored=side,
+            pattern=None if reseau is None else reseau.with_shifts(values[8:].reshape(-1, 2)),
+        )
+        computed, partials = _photocore.film_readings(film.numbers(), _vectors(film), q)
+        misfits, matrix = (xy - computed).ravel(), partials[:, :, 2 : 2 + known].reshape(rows, known)
+        if reseau is not None:
+            cosine, sine = np.cos(values[2]), np.sin(values[2])
+            turn = np.array([[cosine, -sine], [sine, cosine]]) * [-1.0 if side else 1.0, 1.0]
+            by_shifts = np.einsum("nij,nk->nikj", partials[:, :, 2:4] @ turn, _parts(reseau, q))
+            observed = np.eye(len(columns))[known:]
+            matrix = np.vstack([np.hstack([matrix, by_shifts.reshape(rows, -1)]), observed])
+            misfits = np.concatenate([misfits, -values[8:]])
+        scale = np.linalg.norm(matrix, axis=0)
+        if not (scale > 0).all() or np.linalg.matrix_rank(matrix / scale) < len(columns):
+            raise InputError(phrase("films.undetermined", model=model))
+        fit = Fit.of(misfits, covariance, matrix)
+        values[columns] += fit.parameters
+        if np.abs(fit.parameters * moves).max() < _CONVERGED * size:
+            break
+    else:
+        raise InputError(phrase("films.not-converged", model=model))
+    cofactors, of_film = fit.cofactors[:known, :known], np.zeros((6, 6))
+    affine = None
+    if known <= 6:
+        of_film[:known, :known] = cofactors
+        vectors = _vectors(film)
+        vectors[0], vectors[1] = values[:3], values[3:6]
+        affine = affine_form(film, [*vectors], of_film)
+    return Interior(
+        model=model,
+        film=frozen(values[:6]),
+        bend=frozen(values[6:8]),
+        unknowns=names,
+        cofactors=frozen(cofactors),
+        residuals=frozen(fit.residuals[:rows].reshape(-1, 2)),
+        redundancy=frozen(fit.redundancy[:rows].reshape(-1, 2)),
+        omega=fit.omega,
+        degrees_of_freedom=len(misfits) - len(columns),
+        mirrored=side,
+        affine=affine,
+        shifts=frozen(values[8:].reshape(-1, 2)),
+    )
 
 
 def true_places(
@@ -246,107 +292,13 @@ def side_residuals(places: Floats, true: Floats) -> tuple[float, float]:
     return found[0], found[1]
 
 
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    places: Floats
-    readings: Floats
-    variances: Floats  # (2 n,) of the readings
-    names: Sequence[str]
-    counted: Readings
-    scanner: Scanner
-    curves: Sequence[ScannerCurve]
-    mirrored: bool
-    projective: bool
-    reseau: Reseau | None
-
-    def film(self, values: Floats) -> Film:
-        own = self.reseau
-        return Film(
-            FilmPlacement("p", values[:3]),
-            FilmSize("p", values[3:6]),
-            self.scanner,
-            self.counted,
-            bend=FilmBend("p", values[6:8]) if len(self.names) > 6 else None,
-            projective=self.projective,
-            curves=self.curves,
-            mirrored=self.mirrored,
-            pattern=None if own is None else own.with_shifts(values[8:].reshape(-1, 2)),
-        )
-
-    def equations(self, values: Floats) -> tuple[Floats, Floats]:
-        """Return misfits (2 n,) and partials (2 n, k), with the rows of the reseau."""
-        film = self.film(values)
-        computed, partials = _photocore.film_readings(film.numbers(), _vectors(film), self.places)
-        columns = [2 + _place(name) for name in self.names]
-        own, misfits = partials[:, :, columns].reshape(-1, len(columns)), (self.readings - computed).ravel()
-        if self.reseau is None:
-            return misfits, own
-        theta = values[2]
-        turn = np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
-        by_shift = partials[:, :, 2:4] @ turn * [-1.0 if self.mirrored else 1.0, 1.0]
-        nodes = np.einsum("nij,nk->nikj", by_shift, _parts(self.reseau, self.places)).reshape(len(own), -1)
-        observed = np.eye(len(columns) + nodes.shape[1])[len(columns) :]
-        return np.concatenate([misfits, -values[8:]]), np.vstack([np.hstack([own, nodes]), observed])
-
-    def adjusted(self, model: FilmModel, values: Floats) -> Interior:
-        known, shifts = [_place(name) for name in self.names], list(range(8, len(values)))
-        columns, size, rows = known + shifts, np.abs(self.places).max(), 2 * len(self.places)
-        # Movements of a mark at the edge per unit of each unknown
-        moves = np.array([1.0, 1.0, *[size] * 4, *[size**2] * 2, *np.ones(len(shifts))])[columns]
-        covariance = np.diag(np.concatenate([self.variances, np.ones(len(shifts))]))
-        if self.reseau is not None:
-            covariance[rows:, rows:] = self.reseau.covariance
-        for _ in range(_MAX_STEPS):
-            misfits, matrix = self.equations(values)
-            scale = np.linalg.norm(matrix, axis=0)
-            if not (scale > 0).all() or np.linalg.matrix_rank(matrix / scale) < len(columns):
-                raise InputError(phrase("films.undetermined", model=model))
-            fit = Fit.of(misfits, covariance, matrix)
-            values[columns] += fit.parameters
-            if np.abs(fit.parameters * moves).max() < _CONVERGED * size:
-                break
-        else:
-            raise InputError(phrase("films.not-converged", model=model))
-        cofactors = fit.cofactors[: len(known), : len(known)]
-        return Interior(
-            model=model,
-            film=frozen(values[:6]),
-            bend=frozen(values[6:8]),
-            unknowns=tuple(self.names),
-            cofactors=frozen(cofactors),
-            residuals=frozen(fit.residuals[:rows].reshape(-1, 2)),
-            redundancy=frozen(fit.redundancy[:rows].reshape(-1, 2)),
-            omega=fit.omega,
-            degrees_of_freedom=len(misfits) - len(columns),
-            mirrored=self.mirrored,
-            affine=self._affine(values, cofactors) if len(self.names) <= 6 else None,
-            shifts=frozen(values[8:].reshape(-1, 2)),
-        )
-
-    def _affine(self, values: Floats, cofactors: Floats) -> Affine:
-        """Return the affine form without non-affine terms of the scanner."""
-        film = self.film(values)
-        places = [_place(name) for name in self.names]
-        of_film = np.zeros((6, 6))
-        of_film[np.ix_(places, places)] = cofactors
-        return affine_form(film, [*_vectors(film)], of_film)
-
-
 def _parts(reseau: Reseau, places: Floats) -> Floats:
     """Return (n, nodes) weights of the node shifts at coordinates (n, 2)."""
     still = Film(FilmPlacement("still"), FilmSize("still"), Scanner("still"), Readings(), pattern=reseau)
-    vectors = np.array([each.position for each in still.unknowns])
+    vectors, found = _vectors(still), []
     first = len(vectors) - len(reseau.weights)
-    vectors[first:] = 0.0
-    found = np.empty((len(places), len(reseau.weights)))
-    for k in range(found.shape[1]):
-        moved = vectors.copy()
-        moved[first + k, 0] = 1.0
-        readings, _ = _photocore.film_readings(still.numbers(), moved, places)
-        found[:, k] = (readings - places)[:, 0]
-    return found
-
-
-def _place(name: str) -> int:
-    """Return the index of an unknown among t1, t2, theta, m, b1, b2 and h or g."""
-    return UNKNOWNS["projective" if name in ("g1", "g2") else "bilinear"].index(name)
+    for row in range(first, len(vectors)):
+        vectors[first:] = 0.0
+        vectors[row, 0] = 1.0
+        found.append((_photocore.film_readings(still.numbers(), vectors, places)[0] - places)[:, 0])
+    return np.column_stack(found)
