@@ -13,8 +13,7 @@ from given_targets import NAMES, golden, rig_cofactors
 from golden_data import shared
 from photogram import Camera, _photocore
 from photogram.targets.housing import Housing, SeenCorners, mean_motion
-from photogram.targets.new_views import view_rows
-from photogram.targets.vision import composed, of_vectors
+from photogram.targets.vision import composed, motion_partials, of_vectors
 
 VIEWS = 20
 
@@ -139,7 +138,14 @@ def dense(housing):
 def rows_of_view(housing, view):
     """Return whitened partials by the common unknowns and by the pose of a view; observed less computed."""
     seen, own = housing.seen, housing.seen.views == view
-    xy, by_common, by_pose, _ = view_rows(housing, housing.poses[view], seen.cameras[own], seen.points[own])
+    pose, points, cameras = housing.poses[view], seen.points[own], seen.cameras[own]
+    turned = housing.points[points] @ pose[:3, :3].T
+    each = [housing.linearized(camera, turned + pose[:3, 3]) for camera in range(len(housing.cameras))]
+    xy, by_point, by_common = (
+        np.stack(parts)[cameras, np.arange(len(points))] for parts in zip(*each, strict=True)
+    )
+    by_pose = by_point @ motion_partials(turned)
+    by_common[:, :, housing.board] = by_point @ pose[:3, :3] @ housing.points_by_board[points]
     sd = seen.sd[own, np.newaxis]
     return (
         (by_common / sd[:, :, np.newaxis]).reshape(-1, housing.common),

@@ -188,16 +188,16 @@ class Certificate(Documented, Judged):
         }
         figures |= {each.name: repr(each.length) for each in self.distances}
         figures |= self.typed
-        usual = self._usual(list(self.places))
         return tuple(
-            difference_of(each.first, each.second, figures, usual)
+            difference_of(each.first, each.second, figures, self._design)
             for each in self.distances
             if {each.first, each.second} <= self.places.keys()
         )
 
-    def _usual(self, names: list[str]) -> dict[str, tuple[float, float]]:
-        usual = usual_places(self.camera_type)
-        return {**({} if usual is None else usual.places(names)), **self.design}
+    @property
+    def _design(self) -> dict[str, tuple[float, float]]:
+        """Nominal coordinates of marks: as given, or the usual ones of the type."""
+        return {**{mark: xy for mark, (xy, _) in usual_places(self.camera_type).items()}, **self.design}
 
     def fiducials(self) -> CalibratedMarks:
         """Return coordinates and covariance of the marks, as given or from distances.
@@ -221,14 +221,19 @@ class Certificate(Documented, Judged):
         marks = self._of_distances()
         if not marks:
             raise self._error("films.no-marks")
-        places = self._usual(marks)
+        places = self._design
         if missing := [name for name in marks if name not in places]:
             raise self._error("films.no-design", marks=missing)
+        usual = {
+            mark: sd for mark, (_, sd) in usual_places(self.camera_type).items() if mark not in self.design
+        }
         adjusted = adjust_distances(
             marks,
             np.array([places[name] for name in marks]),
             self.distances,
-            design_sd=np.array([self._sd_design(name) for name in marks]),
+            design_sd=np.array(
+                [usual.get(name, SD_DESIGN) if self.sd_design is None else self.sd_design for name in marks]
+            ),
             conditions=self.lines,
         )
         return CalibratedMarks(adjusted.names, adjusted.xy, adjusted.covariance, adjusted)
@@ -236,12 +241,6 @@ class Certificate(Documented, Judged):
     def _of_distances(self) -> list[str]:
         named = [mark for each in self.distances for mark in (each.first, each.second)]
         return list(dict.fromkeys([*named, *(mark for each in self.lines for mark in each.marks)]))
-
-    def _sd_design(self, mark: str) -> float:
-        usual = usual_places(self.camera_type)
-        if self.sd_design is not None:
-            return self.sd_design
-        return SD_DESIGN if usual is None or mark in self.design else usual.sd(mark)
 
     def curves(self) -> tuple[Curve, ...]:
         """Return the fits of the distortion table with one, two and three odd terms.
@@ -347,7 +346,6 @@ class Certificate(Documented, Judged):
         return self._printed_less(1.0)
 
     def _printed_less(self, sign: float) -> float:
-        """Return the largest deviation of printed coefficients from the signed table, mm."""
         assert self.radial is not None
         assert self.c is not None
         radius = self.c * np.tan(self.radial.angle)

@@ -102,9 +102,11 @@ def difference_message(difference: DistanceDifference) -> Phrase:
 def difference_of(
     first: str, second: str, typed: Mapping[str, str], usual: Mapping[str, tuple[float, float]]
 ) -> DistanceDifference:
-    """Compare a distance with the coordinates of its marks and explain the difference.
+    """Compare a distance with the coordinates of its marks, and find single corrections that reconcile them.
 
     `typed` contains all transcribed values by field, `usual` the usual coordinates of marks (mm), if known.
+    Corrections are sorted by type of error, then by the largest distance of a mark from its usual
+    coordinates. If these are unknown, the remaining difference is the second criterion.
     """
     name = f"{first}-{second}"
     fields = [*(f"{mark}.{axis}" for mark in (first, second) for axis in "xy"), name]
@@ -112,30 +114,17 @@ def difference_of(
     if not found.beyond:
         return found
     places = {field: usual[field[:-2]]["xy".index(field[-1])] for field in fields[:4] if field[:-2] in usual}
-    return replace(found, explanations=explained(fields, {field: typed[field] for field in fields}, places))
-
-
-def explained(
-    fields: Sequence[str], typed: Mapping[str, str], places: Mapping[str, float]
-) -> tuple[Explanation, ...]:
-    """Return the single corrections that reconcile a distance with four coordinates.
-
-    They are sorted by type of error, then by the largest distance of a mark from its usual coordinates. If
-    these are unknown, the remaining difference is the second criterion. `fields` are x and y of both marks,
-    then the distance; `typed` contains their values, `places` the known usual coordinates.
-    """
-    found: list[tuple[tuple[int, float, int, int], Explanation]] = []
-    kinds = get_args(How)
+    ranked: list[tuple[tuple[int, float, int, int], Explanation]] = []
     for order, field in enumerate(fields):
         for how, perhaps in _variants(typed[field]):
-            changed = {**typed, field: perhaps}
-            left = float(changed[fields[-1]]) - _from_coordinates(fields, changed)
+            changed = {**{each: typed[each] for each in fields}, field: perhaps}
+            left = float(changed[name]) - _from_coordinates(fields, changed)
             if abs(left) < EXPLAINED:
-                usual = float(perhaps) - places[field] if field in places else None
+                moved = float(perhaps) - places[field] if field in places else None
                 far = max((abs(float(changed[each]) - places[each]) for each in places), default=0.0)
-                rank = kinds.index(how), far, round(abs(left) / SAME), order
-                found.append((rank, Explanation(field, typed[field], perhaps, how, left, usual)))
-    return tuple(each for _, each in sorted(found, key=lambda pair: pair[0]))
+                rank = get_args(How).index(how), far, round(abs(left) / SAME), order
+                ranked.append((rank, Explanation(field, typed[field], perhaps, how, left, moved)))
+    return replace(found, explanations=tuple(each for _, each in sorted(ranked, key=lambda pair: pair[0])))
 
 
 def _from_coordinates(fields: Sequence[str], typed: Mapping[str, str]) -> float:

@@ -33,7 +33,6 @@ CURVE = (
 
 
 def certificate_document(certificate: Certificate) -> Document:
-    """Return the document of a certificate."""
     facts, verdict, cameras = _facts(certificate), certificate.verdict, _cameras(certificate)
     differences = certificate.check()
     distances = compared(differences)
@@ -229,7 +228,6 @@ RADII = 8  # points of the printed distortion curve
 
 
 def marks(found: CalibratedMarks) -> Table:
-    """Return the marks with their coordinates and standard deviations."""
     sd = np.sqrt(np.diag(found.covariance)).reshape(-1, 2)
     columns = [
         Quantity([*found.names], kind="name", member="mark", head="Mark"),
@@ -240,7 +238,6 @@ def marks(found: CalibratedMarks) -> Table:
 
 
 def compared(differences: Sequence[DistanceDifference]) -> Table:
-    """Return given and computed distances, and corrections that explain differences."""
     given, computed, apart = (
         np.array([getattr(each, name) for each in differences])
         for name in ("distance", "from_coordinates", "difference")
@@ -262,7 +259,6 @@ def compared(differences: Sequence[DistanceDifference]) -> Table:
 
 
 def explanations(differences: Sequence[DistanceDifference]) -> Table:
-    """Return the single corrections that explain differences, and the remaining ones."""
     pairs: list[tuple[str, Explanation | None]] = [
         (each.name, one)
         for each in differences
@@ -286,7 +282,6 @@ def _mm(
 
 
 def observed(found: AdjustedMarks, marked: Bools) -> Table:
-    """Return the adjusted observations with residuals, redundancy, w and error size."""
     of = np.array([int(name.startswith("angle ")) for name in found.rows])
     with np.errstate(divide="ignore", invalid="ignore"):
         error = np.where(np.isnan(found.standardized), math.nan, found.residuals / found.redundancy)
@@ -303,7 +298,6 @@ def observed(found: AdjustedMarks, marked: Bools) -> Table:
 
 
 def distortion(table: RadialTable, found: Curve) -> Table:
-    """Return the distortion table with the residuals of the chosen curve."""
     angle = (Axis.turned("", "deg"),)
     columns = [
         Quantity(table.angle, angle, "value", member="angle_rad", head="Angle", decimals=2),
@@ -317,7 +311,6 @@ def distortion(table: RadialTable, found: Curve) -> Table:
 
 
 def curve(found: Curve) -> Table:
-    """Return the curve at radii within the table, and at one beyond it."""
     radius = np.linspace(0.0, float(found.radius.max()), RADII + 1)[1:]
     radius = np.append(radius, radius[-1] + radius[0])
     columns = [
@@ -349,7 +342,6 @@ def terms(curves: tuple[Curve, ...], taken: int) -> Table:
 
 
 def parameters(camera: Camera) -> Table:
-    """Return the parameters of a camera with their standard deviations, one per row."""
     assert camera.covariance is not None
     names, matrix = camera.covariance
     sd = np.sqrt(np.diag(np.asarray(matrix)))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, cast, get_args
 
@@ -17,21 +17,15 @@ from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.film.distances import Crossing, MarkDistance, RightAngle
-from photogram.film.lens_table import (
-    SEMI_DIAGONALS,
-    RadialTable,
-    SemiDiagonals,
-    Tangential,
-    of_profile,
-    of_semi_diagonals,
-)
+from photogram.film.lens_table import SEMI_DIAGONALS, RadialTable, Tangential, of_semi_diagonals
 from photogram.film.marks import DataStrip, by_side, turned, turned_name
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns
 from photogram.io.places import at_place
 from photogram.io.toml import TomlTree, read_document
 from photogram.messages import unknown_name
-from photogram.words import Phrase, phrase
+from photogram.statistics.fits import Fit
+from photogram.words import phrase
 
 UM = 1e-3
 SD_DISTANCE = 0.002
@@ -207,17 +201,9 @@ def _radial(table: TomlTree, c: float | None, frame: _Frame) -> dict[str, Any]:
         return found | {"radial": RadialTable(angle, values, sd, correlation)}
     singly = {frame.mark(name): outwards * _numbers(own, name, len(angle)) for name in SEMI_DIAGONALS}
     with at_place(own.at("ll")):
-        four = of_semi_diagonals(angle, singly, UM * own["sd_um"].positive() if "sd_um" in own else None)
-    radial = RadialTable(angle, four.mean, four.sd, correlation)
-    return found | {"radial": radial, "remarks": tuple(_remarks_on(four))}
-
-
-def _remarks_on(four: SemiDiagonals) -> Iterator[Phrase]:
-    if four.is_elsewhere:
-        x, y = four.centre.tolist()
-        yield phrase("films.symmetry-elsewhere", x=x, y=y, sd=float(four.sd_centre))
-    sizes = {"size": float(four.decentring / UM), "sd": float(four.sd_half_difference / UM)}
-    yield phrase("films.decentring-of-diagonals", **sizes)
+        sd = UM * own["sd_um"].positive() if "sd_um" in own else None
+        mean, sd, remarks = of_semi_diagonals(angle, singly, sd)
+    return found | {"radial": RadialTable(angle, mean, sd, correlation), "remarks": tuple(remarks)}
 
 
 def _tangential(
@@ -239,8 +225,9 @@ def _tangential(
         raise own.at("displacement").error(phrase("error.requires", name="displacement", other="c"))
     angle = _angles(own, c)
     values = UM * _numbers(own, "displacement", len(angle))
-    j1, sd_j1 = of_profile(c * np.tan(angle), values, sd)
-    return Tangential(j1, phi0, sign, sd_j1)
+    # The profile P(r) = J1 r^2
+    fit = Fit.of(values, sd**2 * np.eye(len(angle)), (c * np.tan(angle))[:, np.newaxis] ** 2)
+    return Tangential(float(fit.parameters[0]), phi0, sign, math.sqrt(float(fit.cofactors[0, 0])))
 
 
 SD_PLACE = 0.002  # of a coordinate that is printed to 0.001 mm
@@ -263,8 +250,7 @@ def read_table(path: Path, camera: str | None) -> dict[str, Any]:
     marks = [by_side(each) for each in table.texts("fiducial")]
     use = table.words("use", ("on", "off"))
     on = [row for row in rows if use[row] == "on"]
-    xy = table.vectors(("x", "y"))
-    table.check_given(xy, ("x", "y"))
+    xy = table.given(("x", "y"))
     sd = table.vectors(("sd_x", "sd_y"), SD_PLACE)
     names = [marks[row] for row in on]
     for row in on:

@@ -242,7 +242,6 @@ def _observed(
 
 
 def _of_axes(name: str, observed: Sequence[float], sd: float, at: Callable[[Points], Points]) -> list[_Row]:
-    """Return x and y of a point as observations."""
     return [
         _Row(name + letter, observed[axis], sd, lambda xy, axis=axis: at(xy)[..., axis])  # type: ignore[misc]
         for axis, letter in enumerate("xy")

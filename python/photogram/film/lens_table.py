@@ -19,11 +19,11 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.distributions import critical_chi_square
 from photogram.statistics.fits import Fit
 from photogram.statistics.limits import GlobalTest, global_test
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 MAX_TERMS = 3  # odd terms of cameras
 LEVEL = 0.01  # significance level of a term
@@ -259,57 +259,32 @@ class Tangential:
         return -size * math.sin(self.phi0), size * math.cos(self.phi0)
 
 
-def of_profile(radius: Floats, displacement: Floats, sd: float) -> tuple[float, float]:
-    """Fit P(r) = J1 r^2 to (n,) displacements of one sd (mm); return J1 and its sd."""
-    fit = Fit.of(displacement, sd**2 * np.eye(len(radius)), radius[:, np.newaxis] ** 2)
-    return float(fit.parameters[0]), math.sqrt(float(fit.cofactors[0, 0]))
-
-
-@dataclass(frozen=True, eq=False)
-class SemiDiagonals:
-    """Distortion along four semi-diagonals.
+def of_semi_diagonals(
+    angle: Floats, distortion: Mapping[str, Floats], sd: float | None
+) -> tuple[Floats, float, list[Phrase]]:
+    """Return the mean of four semi-diagonals (n,), its sd, and remarks on the differences of opposite ones.
 
     Opposite ones differ by h = u o + d r^2 in the direction u. d is the decentring, o the point of symmetry
-    relative to the origin of the radii.
-    """
-
-    mean: Floats  # (n,) mean of the four, mm
-    sd: float  # of the mean
-    centre: Floats  # (2,) o, the data strip at the left, mm
-    sd_centre: float
-    decentring: float  # Largest half difference of opposite ones without o, mm
-
-    @property
-    def sd_half_difference(self) -> float:
-        """Standard deviation of a half difference, mm; its variance is twice the mean's."""
-        return self.sd * math.sqrt(2)
-
-    @property
-    def is_elsewhere(self) -> bool:
-        """Whether the point of symmetry differs significantly from the origin."""
-        return float(np.abs(self.centre).max()) > ELSEWHERE * self.sd_centre
-
-
-def of_semi_diagonals(angle: Floats, distortion: Mapping[str, Floats], sd: float | None) -> SemiDiagonals:
-    """Return the mean of four semi-diagonals, and the differences of opposite ones.
-
-    Half of ll + ur - ul - lr has the variance of a single reading. It gives the standard deviation of the
-    mean without a given `sd` (mm). Angles are (n,) rad, distortion (n,) mm along each of `SEMI_DIAGONALS`.
-    InputError: if readings are equal and `sd` is not given.
+    relative to the origin of the radii. Half of ll + ur - ul - lr has the variance of a single reading. It
+    gives the standard deviation of the mean without a given `sd` (mm); the variance of a half difference is
+    twice the mean's. Angles are (n,) rad, distortion (n,) mm along each of `SEMI_DIAGONALS`. InputError: if
+    readings are equal and `sd` is not given.
     """
     ll, ul, ur, lr = (np.asarray(distortion[name], float) for name in SEMI_DIAGONALS)
     single = math.sqrt(float(np.mean(((ll + ur - ul - lr) / 2) ** 2)))
     found = single / 2 if sd is None else sd
     if not found > 0:
         raise InputError(phrase("films.equal-diagonals"))
-    halves: Floats = np.column_stack([ur - ll, ul - lr]) / 2
+    halves, remarks = np.column_stack([ur - ll, ul - lr]) / 2, list[Phrase]()
     columns = np.column_stack([np.ones(len(angle)), np.tan(angle) ** 2])
-    constant, sd_constant = np.zeros(2), math.inf
     if len(np.unique(angle)) > columns.shape[1]:
         constant = np.linalg.lstsq(columns, halves, rcond=None)[0][0]
         sd_constant = found * math.sqrt(2 * np.linalg.inv(columns.T @ columns)[0, 0])
-    # Along the diagonals to ur and to ul.
-    centre = np.array([[1.0, -1.0], [1.0, 1.0]]) @ constant / math.sqrt(2)
-    four = SemiDiagonals((ll + ul + ur + lr) / 4, found, centre, sd_constant, 0.0)
-    left = halves - constant if four.is_elsewhere else halves
-    return replace(four, decentring=float(np.abs(left).max()))
+        # Along the diagonals to ur and to ul.
+        x, y = (np.array([[1.0, -1.0], [1.0, 1.0]]) @ constant / math.sqrt(2)).tolist()
+        if max(abs(x), abs(y)) > ELSEWHERE * sd_constant:
+            remarks.append(phrase("films.symmetry-elsewhere", x=x, y=y, sd=sd_constant))
+            halves = halves - constant
+    sizes = {"size": float(np.abs(halves).max() * 1e3), "sd": found * math.sqrt(2) * 1e3}
+    remarks.append(phrase("films.decentring-of-diagonals", **sizes))
+    return (ll + ul + ur + lr) / 4, found, remarks

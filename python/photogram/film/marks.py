@@ -7,7 +7,6 @@ and both sides of the film are tested.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -38,7 +37,6 @@ def by_side(name: str) -> str:
 
 
 def turned_name(name: str, data_strip: DataStrip) -> str:
-    """Return the side after rotation of the data strip to the left."""
     return _TURNED.get(name, name) if data_strip == "top" else name
 
 
@@ -60,43 +58,24 @@ _SIGNS = {
 """Directions of marks from the centre."""
 
 
-@dataclass(frozen=True)
-class UsualPlaces:
-    """Usual coordinates of the marks of a camera type."""
-
-    # Distance of the marks from the axes (mm): corners at (corner, corner), middles at (middle, 0)
-    corner: float
-    middle: float
-    sd_corner: float  # Robust standard deviations of single marks (mm) in public reports
-    sd_middle: float
-
-    def places(self, names: Sequence[str]) -> dict[str, tuple[float, float]]:
-        """Return the coordinates of marks by side, without custom names."""
-        found = {}
-        for name in names:
-            if name in _SIGNS:
-                (x, y), away = _SIGNS[name], self.middle if name.startswith("m") else self.corner
-                found[name] = (x * away, y * away)
-        return found
-
-    def sd(self, name: str) -> float:
-        """Return the standard deviation of a mark."""
-        return self.sd_middle if name.startswith("m") else self.sd_corner
+# Corners at (a, a) and middles at (a, 0) by type: a, and the robust standard deviation of a mark (mm) in
+# public reports (docs/certificates.md)
+_WILD = ((106.0, 0.013), (110.0, 0.013))
+_TYPES = {"rc8": _WILD, "rc10": _WILD, "rmka15/23": ((103.96, 0.04), (113.0, 0.015))}
 
 
-_WILD = UsualPlaces(106.0, 110.0, 0.013, 0.013)
-_TYPES: Mapping[str, UsualPlaces] = {
-    "rc8": _WILD,
-    "rc10": _WILD,
-    "rmka15/23": UsualPlaces(103.96, 113.0, 0.04, 0.015),
-}
-"""By type, from USGS reports (docs/certificates.md)."""
+def usual_places(camera_type: str) -> dict[str, tuple[tuple[float, float], float]]:
+    """Return usual coordinates (mm) of the marks of a camera type by side, and their sd; empty if unknown.
 
-
-def usual_places(camera_type: str) -> UsualPlaces | None:
-    """Return the usual coordinates of a camera type, ignoring a prefix, or None."""
+    A prefix of the type is ignored.
+    """
     plain = "".join(camera_type.lower().split())
-    return next((found for name, found in _TYPES.items() if plain.endswith(name)), None)
+    found = {}
+    for corner, middle in [own for name, own in _TYPES.items() if plain.endswith(name)][:1]:
+        for side, (x, y) in _SIGNS.items():
+            away, sd = middle if side.startswith("m") else corner
+            found[side] = (x * away, y * away), sd
+    return found
 
 
 CHANCE = 1e-4  # Probability of a wrong choice among the eight
@@ -204,7 +183,6 @@ def which_mark(places: ArrayLike, true: ArrayLike, *, sd: float = 0.004) -> Whic
 
 
 def _tried(q: Floats, p: Floats, turns: int, *, mirrored: bool) -> tuple[Indices, float]:
-    """Return the mark of each reading for an orientation, and the sum of squares."""
     lain = q * [-1.0, 1.0] if mirrored else q
     turn = np.linalg.matrix_power(np.array([[0.0, -1.0], [1.0, 0.0]]), turns)
     lain = lain @ turn.T

@@ -260,7 +260,6 @@ def _motion(pattern: Pattern) -> Table:
 
 
 def _unknowns(pattern: Pattern, unknowns: Sequence[UnknownQuality], more: Quantity) -> Table:
-    """Return a table with one row per unknown and its unit."""
     units = [SMALL_UNITS.get(each.unit, (each.unit, 1.0)) for each in unknowns]
     axes = tuple(
         Axis(each.unknown, small=unit, factor=factor)

@@ -347,7 +347,6 @@ def locations(points: Floats, stations: Floats) -> NDArray[np.str_]:
 
 
 def _times_on_trajectories(block: Block) -> dict[str, Floats]:
-    """Return the evaluated times of trajectories that photos share, by name."""
     found: dict[str, list[float]] = {}
     for each, trajectory, _, own in timed_images(block):
         if each.trajectory is not None and len(own):

@@ -20,10 +20,8 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
-from photogram.network.moving_photos import Timed
 from photogram.network.passages import Bend, Figure
 from photogram.network.rigs import Mount
-from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 from photogram.results.result import Result
 from photogram.results.snooping_options import SnoopOptions
@@ -32,7 +30,7 @@ from photogram.summaries import Brief, Rows, few
 from photogram.targets.board import Board
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corners import Corners, check_points
-from photogram.targets.motion import CLOCK, MAX_GAP_SECONDS, POWERS, dated, moved, moving, pictures_in_motion
+from photogram.targets.motion import MAX_GAP_SECONDS, POWERS, dated, moved, moving, pictures_in_motion
 from photogram.targets.options import Regularisation, Shape, Synchronisation
 from photogram.targets.regularisation import weighted_block
 from photogram.targets.rounds import better_start, checked_clocks, has_knots, marked_as_mrcal
@@ -276,13 +274,15 @@ class Calibration(Valued, Brief):
         names = [*corners.pictures, *frames]
         alone = photo >= len(corners.pictures)
         centres, attitudes = photo_poses(np.concatenate([self.picture_poses(), poses[alone]]))
-        use, mounts = corners.use, []
-        if self.sync == "known":
-            sensors = self._sensors()
-            mounts = [
-                Mount(names[row], names[photo[corners.views[row]]], sensors[corners.cameras[row]])
-                for row in np.flatnonzero(self.tied[corners.cameras]).tolist()
-            ]
+        use, tied = corners.use, zip(np.asarray(self.sensors), np.asarray(self.sd_sensors), strict=True)
+        sensors = [
+            Sensor.from_colmap(name, pose[:3, :3], pose[:3, 3], own)
+            for name, (pose, own) in zip(corners.camera_names, tied, strict=True)
+        ]
+        mounts = [
+            Mount(names[row], names[photo[corners.views[row]]], sensors[corners.cameras[row]])
+            for row in np.flatnonzero(self.tied[corners.cameras] & (self.sync == "known")).tolist()
+        ]
         return Block(
             photo_ids=names,
             photo_positions=centres,
@@ -297,7 +297,7 @@ class Calibration(Valued, Brief):
             image_xy=corners.xy[use],
             image_sd=np.repeat(corners.sd[use, np.newaxis] * (self.sd0 or self.assumed), 2, axis=1),
             mounts=mounts,
-            timed=self._timed() if self.sync == "offset" else [],
+            timed=pictures_in_motion(self, sensors) if self.sync == "offset" else [],
             linear_unit=self.board.unit,
             passages=[Figure(Bend(BOARD, self.bend, self.sd_bend), self.board.names, self.board.shifts())]
             if self.shape == "bend"
@@ -310,24 +310,6 @@ class Calibration(Valued, Brief):
         reference = np.empty(corners.view_count, dtype=np.int64)
         reference[corners.views] = np.asarray(self.references)[corners.cameras]
         return reference
-
-    def _sensors(self) -> list[Sensor]:
-        names, sensors, sd = self.corners.camera_names, np.asarray(self.sensors), np.asarray(self.sd_sensors)
-        return [
-            Sensor.from_colmap(name, pose[:3, :3], pose[:3, 3], own)
-            for name, pose, own in zip(names, sensors, sd, strict=True)
-        ]
-
-    def _timed(self) -> list[Timed]:
-        offsets, sd = np.asarray(self.offsets).tolist(), np.asarray(self.sd_offsets).tolist()
-        clocks = [
-            Clock(CLOCK + name, offsets[k], sd[k]) if tied else None
-            for k, (name, tied) in enumerate(zip(self.corners.camera_names, self.tied.tolist(), strict=True))
-        ]
-        times, poses = dated(self.corners, self.tied), np.asarray(self.poses)
-        return pictures_in_motion(
-            self.corners, poses, np.asarray(self.motion), times, self._sensors(), clocks
-        )
 
     def residuals(self) -> Floats:
         """Return (n, 2) observed minus computed corners with the given values, pixels."""

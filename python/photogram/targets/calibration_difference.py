@@ -43,8 +43,6 @@ MIN_PROBABILITY = 0.01  # calibrations with a larger p agree
 
 @dataclass(frozen=True)
 class DifferenceTest:
-    """Test of a difference of two calibrations."""
-
     name: str  # name of the difference
     chi2: float  # dk' cov(dk)^-1 dk over the variance of unit weight
     dof: int
@@ -59,7 +57,6 @@ class DifferenceTest:
 
     @property
     def explained(self) -> bool:
-        """Whether the cofactors explain the difference."""
         return self.probability > MIN_PROBABILITY
 
     @property
@@ -304,8 +301,6 @@ def difference(
 
 @dataclass(frozen=True, eq=False)
 class Side:
-    """One of two compared calibrations."""
-
     name: str  # Name of the camera
     camera: Camera
     # (m, 2) observed board corners; empty if unknown
@@ -363,7 +358,6 @@ def differences_at(
 def _test(
     a: Side, b: Side, size: tuple[int, int], distances: Sequence[float], fitted: Fitted, datums: list[Floats]
 ) -> DifferenceTest:
-    """Test parameters jointly for equal models, else differences over a grid."""
     assert a.covariance is not None
     assert b.covariance is not None
     unknown = unknown_of(a.camera)

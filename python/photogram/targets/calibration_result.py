@@ -229,36 +229,28 @@ class Calibrated(Result):
         steps: list[Floats | int] = []
         for part in parts:
             one_of("part of a calibration", part, get_args(Part))
-            own_names, selections, partials = getattr(self, f"_{part}")()
-            names += own_names
-            wanted += [each for each in selections if each[1]]
-            steps += partials
-        return names, wanted, steps
-
-    def _cameras(self) -> Chosen:
-        names: list[str] = []
-        selections: list[tuple[str, list[str]]] = []
-        for each, given in zip(self.cameras, self.block.cameras, strict=True):
-            knots = [knot.name for knot in given.knot_unknowns]
-            own = each.names + (given.knot_names if knots else ())
-            names += [f"{each.name} {name}" for name in own]
-            selections += [("camera", [each.name]), ("unknown", knots)]
-        return names, selections, [len(names)]
-
-    def _sensors(self) -> Chosen:
-        rows = self.sensors_adjusted()
-        own = [self.cameras[row].name for row in rows]
-        names = [f"{name} {step}" for name in own for step in STEPS]
-        return names, [("unknown", own)], [sensor_steps(self.sensors[row]) for row in rows]
-
-    def _board(self) -> Chosen:
-        if self.bend is not None:
-            return ["bend_x", "bend_y"], [("unknown", [self.bend.name])], [2]
-        seen = np.flatnonzero(self.used_points).tolist()
-        own = [self.calibration.board.names[row] for row in seen]
-        return [f"{name}.{axis}" for name in own for axis in "xyz"], [("point", own)], [3 * len(own)]
-
-    def _views(self) -> Chosen:
-        photos = [self.block.photo_ids[row] for row in self.photos.tolist()]
-        names = [f"view {view} {step}" for view in range(len(photos)) for step in STEPS]
-        return names, [("step", photos)], [view_steps(pose) for pose in self.poses]
+            before = len(names)
+            if part == "cameras":
+                for each, given in zip(self.cameras, self.block.cameras, strict=True):
+                    knots = [knot.name for knot in given.knot_unknowns]
+                    names += [f"{each.name} {name}" for name in each.names + given.knot_names * bool(knots)]
+                    wanted += [("camera", [each.name]), ("unknown", knots)]
+                steps.append(len(names) - before)
+            elif part == "sensors":
+                rows = self.sensors_adjusted()
+                own = [self.cameras[row].name for row in rows]
+                names += [f"{name} {step}" for name in own for step in STEPS]
+                wanted.append(("unknown", own))
+                steps += [sensor_steps(self.sensors[row]) for row in rows]
+            elif part == "views":
+                photos = [self.block.photo_ids[row] for row in self.photos.tolist()]
+                names += [f"view {view} {step}" for view in range(len(photos)) for step in STEPS]
+                wanted.append(("step", photos))
+                steps += [view_steps(pose) for pose in self.poses]
+            else:
+                own = [self.calibration.board.names[row] for row in np.flatnonzero(self.used_points).tolist()]
+                points = [f"{name}.{axis}" for name in own for axis in "xyz"]
+                names += points if self.bend is None else ["bend_x", "bend_y"]
+                wanted.append(("point", own) if self.bend is None else ("unknown", [self.bend.name]))
+                steps.append(len(names) - before)
+        return names, [each for each in wanted if each[1]], steps

@@ -251,7 +251,6 @@ def convert_lens(
 
 
 def _known(source: Camera, given: tuple[Sequence[str], ArrayLike] | None) -> tuple[list[int], Floats] | None:
-    """Return the source parameters and knots with a covariance, and the matrix."""
     names = names_of(source)
     if given is not None:
         own, matrix = list(given[0]), np.asarray(given[1], dtype=float)

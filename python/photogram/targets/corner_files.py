@@ -51,7 +51,6 @@ def _first_line(path: Path) -> str:
 
 
 def is_table(path: Path) -> bool:
-    """Return whether the columns of a file define a corner table."""
     if path.suffix.lower() not in (".csv", ".tsv", ".txt"):
         return False
     cells = _first_line(path).replace(";", ",").split(",")
@@ -257,7 +256,6 @@ _FORMS = (
 
 
 def is_picture(path: Path) -> bool:
-    """Return whether a file name has an image suffix."""
     return path.suffix.lower() in PICTURES
 
 
@@ -275,7 +273,6 @@ def files_at(path: Path) -> list[Path]:
 
 
 def sorted_files(path: Path) -> tuple[list[Path], list[Path], dict[Form, list[Path]]]:
-    """Return mrcal models, board descriptions, and corner files by format."""
     models, boards = [], []
     corners: dict[Form, list[Path]] = {}
     for each in files_at(path):

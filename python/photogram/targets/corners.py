@@ -232,7 +232,6 @@ class Measured:
 
 
 def grouped(measured: Measured, how: CalibrationOptions) -> tuple[Corners, list[Message]]:
-    """Return corners by cameras and views, and warnings."""
     names, keys, keep, messages = _cameras_and_views(measured, how)
     # Images without corners are not used.
     keep &= np.bincount(measured.image, minlength=len(keep)) > 0
@@ -294,7 +293,6 @@ def _sizes_of_pictures(
 def _cameras_and_views(
     measured: Measured, how: CalibrationOptions
 ) -> tuple[list[str], list[str], Bools, list[Message]]:
-    """Return camera names, view keys and use of images, and messages."""
     images = measured.images
     keep = np.ones(len(images), dtype=bool)
     if how.cameras:

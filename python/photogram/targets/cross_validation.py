@@ -54,8 +54,6 @@ RANK_TOLERANCE = 1e-6  # smaller relative cofactors of a change are due to the c
 
 @dataclass(frozen=True, eq=False)
 class CrossMap:
-    """Differences of the projections of a camera between two subsets."""
-
     differences: Floats  # (n, 2) projections by part b minus part a, pixels, in the datum of the whole
     covariances: Floats  # (n, 2, 2) expected covariances of the differences
 
@@ -347,7 +345,6 @@ def appraise(
 
 
 def model_verdict(calibrated: Calibrated, camera: int, cross: Sequence[CrossValidation]) -> str:
-    """Return the verdict on a lens model from cross-validation and residual patterns."""
     name = calibrated.cameras[camera].name
     verdicts = [each.verdict for each in cross if name in each.cameras]
     verdicts = verdicts or ["model not tested by cross-validation"]

@@ -101,8 +101,6 @@ Placed = tuple[Found, float] | None
 
 @dataclass
 class Tags:
-    """Tag detectors for a board, and conversion of tags to corners."""
-
     # Detectors of possible tag families, and tag centres on the board by number
     ways: Sequence[tuple[Any, Floats]]
     # Returns corners from an image, the detector number, tag numbers and corners, and the homography of their

@@ -149,7 +149,6 @@ class _Apart:
     inside: Bools
 
     def panel(self, title: str) -> Panel:
-        """Return lengths as contours, with vectors scaled to their spacing."""
         lengths = np.asarray(np.hypot(self.vectors[..., 0], self.vectors[..., 1]))
         step = max(1, round(len(self.columns) / ARROWS_ALONG_PICTURE))
         every = (slice(None, None, step), slice(None, None, step))
@@ -163,7 +162,6 @@ class _Apart:
         return replace(panel, title=title)
 
     def beside(self, chi2: Floats) -> Panel:
-        """Return the differences relative to their covariances."""
         panel = _map(self.size, self.columns, self.rows, chi2, "", lowest=0.1)
         return replace(panel, title="beside its covariance: d' Q⁻¹ d / 2, about 1 where that explains it")
 
@@ -195,7 +193,6 @@ def _map(
 
 
 def _known(found: UncertaintyMap) -> list[Mark]:
-    """Return the boundary of the known lens region, such as the limit of knots."""
     known = np.isfinite(found.sd)
     if known.all() or not known.any():
         return []
@@ -210,7 +207,6 @@ def _known(found: UncertaintyMap) -> list[Mark]:
 
 
 def in_pixels(size: tuple[int, int]) -> Panel:
-    """Return a panel with the columns and rows of an image."""
     limits = np.array([[-0.5, size[1] - 0.5], [size[0] - 0.5, -0.5]])
     return Panel(limits, across="column, px", up="row, px", equal=True)
 

@@ -32,8 +32,6 @@ MIN_DISTANCE_RATIO = 1.3  # ratio of farthest and nearest view
 
 @dataclass(frozen=True, eq=False)
 class Showing:
-    """Views of the board by a camera."""
-
     camera: str  # Camera name, and the unit of distances
     unit: str
     # Number of the 5 x 4 image parts visible through the lens, and names of those without corners; None if
@@ -45,7 +43,6 @@ class Showing:
 
     @property
     def line(self) -> Phrase:
-        """Summary of the views of the board."""
         fields: dict[str, Any] = {"camera": self.camera, "n": len(self.distances), "unit": self.unit}
         fields |= {"near": _rounded(self.distances.min()), "far": _rounded(self.distances.max())}
         fields |= {"flat": float(self.tilts.min()), "steep": float(self.tilts.max()), "corners": ""}
@@ -56,7 +53,6 @@ class Showing:
 
     @property
     def next(self) -> list[Phrase]:
-        """Advice on missing views."""
         advice = []
         if self.empty:
             advice.append(phrase("advice.board-parts", camera=self.camera, parts=list(self.empty)))
@@ -74,7 +70,6 @@ def _rounded(value: float) -> str:
 
 
 def showings(calibrated: Calibrated) -> list[Showing]:
-    """Return the board views of each camera with corners."""
     corners, board = calibrated.calibration.corners, calibrated.calibration.board
     middle = [*middle_of(calibrated.points), 1.0]
     # Images whose corners were all removed or excluded are not counted.
@@ -137,7 +132,6 @@ def calibration_findings(calibrated: Calibrated, found: Findings) -> Findings:
 
 
 def _other_model(calibrated: Calibrated) -> list[Phrase]:
-    """Return advice on more flexible lens and board models."""
     corners = calibrated.calibration.corners
     free, wide = 0, False
     for number, each in enumerate(calibrated.cameras):

@@ -123,8 +123,6 @@ PREFERENCE_OF_UNTURNED = 1e-3  # larger misfit in the same units accepted for an
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """K cameras, connected by common views."""
-
     sensors: Floats  # (K, 4, 4) from the reference of a camera to the camera
     references: Indices  # (K,) first camera of its group with common views
     turned: Indices  # (P,) the key of `turns` with the corner order of an image; 0: as numbered
@@ -263,7 +261,8 @@ def first_values(
     without |= corners.poor(board.places)
     usable = np.array([name not in without for name in corners.pictures], dtype=bool)
     cameras, remarks = _cameras(seen, corners, usable, without, model, knots)
-    hidden = usable & (rays_shown(seen, corners.cameras, cameras) < MIN_CORNERS_PER_VIEW)
+    there = np.isfinite(_rays(seen, corners.cameras, cameras)).all(axis=2)
+    hidden = usable & (np.count_nonzero(there, axis=1) < MIN_CORNERS_PER_VIEW)
     if (hidden == usable).all():
         raise InputError(phrase("targets.no-pose", model=cameras[0].model))
     without |= {corners.pictures[row]: hidden_corners for row in np.flatnonzero(hidden).tolist()}
@@ -345,12 +344,6 @@ MIN_MISFIT_RAD = 1e-6
 EQUAL_MISFIT_RATIO = 1.5  # largest misfit ratio of an order equivalent to the best
 
 
-def rays_shown(seen: Sightings, of_cameras: Indices, cameras: list[Camera]) -> Indices:
-    """Return (P,) numbers of corners of each image with rays in its camera."""
-    there = np.isfinite(_rays(seen, of_cameras, cameras)).all(axis=2)
-    return np.asarray(np.count_nonzero(there, axis=1))
-
-
 def _rays(seen: Sightings, of_cameras: Indices, cameras: list[Camera]) -> Floats:
     found = np.full((*seen.xy.shape[:2], 3), np.nan)
     for k, camera in enumerate(cameras):
@@ -361,26 +354,21 @@ def _rays(seen: Sightings, of_cameras: Indices, cameras: list[Camera]) -> Floats
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """P images with their cameras."""
-
     seen: Sightings  # Board observations in the images
     names: list[str]  # P names
     of_cameras: Indices  # (P,) camera of each image
     cameras: list[Camera]  # The cameras, with their initial values
     usable: Bools  # (P,) whether an image has enough corners; rays are computed only for these
 
-    def poses(self, orders: Indices) -> Floats:
-        """Return (P, 4, 4) poses board -> camera for corner orders (P,); NaN if unknown."""
-        rows = np.flatnonzero(self.usable)
-        seen = self.seen.of(rows).listed(orders[rows])
-        found = np.full((len(orders), 4, 4), np.nan)
-        rays = _rays(seen, self.of_cameras[rows], self.cameras)
-        found[rows] = poses(ray_homographies(seen.coordinates, rays))
-        return found
-
     def adjusted(self, orders: Indices, fits: Bools) -> Floats:
-        """Return poses of images that fit (P,), adjusted with fixed cameras."""
-        found, seen = self.poses(orders), self.seen.listed(orders)
+        """Return (P, 4, 4) poses board -> camera for corner orders (P,); NaN if unknown.
+
+        Poses of images that fit (P,) are adjusted with fixed cameras.
+        """
+        rows, seen = np.flatnonzero(self.usable), self.seen.listed(orders)
+        found = np.full((len(orders), 4, 4), np.nan)
+        rays = _rays(seen.of(rows), self.of_cameras[rows], self.cameras)
+        found[rows] = poses(ray_homographies(seen.coordinates, rays))
         for k, camera in enumerate(self.cameras):
             own = (self.of_cameras == k) & fits
             held = camera.replace(sd=0.0, knot_sd=None)

@@ -37,8 +37,6 @@ ROUGH_TOLERANCE = 1e-3  # convergence limit of initial values, in standard devia
 
 @dataclass(frozen=True, eq=False)
 class Adjusted:
-    """Adjusted camera with the poses of its views."""
-
     camera: Camera  # The camera with its estimated parameters free
     poses: Floats  # (P, 4, 4) board -> camera
     variance: float  # The variance of unit weight, px^2
@@ -108,8 +106,6 @@ FAMILIES: Mapping[str, Callable[[float], float]] = MappingProxyType(
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """Tested lens."""
-
     camera: Camera  # Its free focal length and principal point
     orders: Indices  # (P,) the best corner order of each image
     misfits: Floats  # (P,) median angles (rad) between rays and board of each image
@@ -182,7 +178,6 @@ def wide(seen: Sightings, size: tuple[int, int], family: str) -> Trial:
 
 
 def trials(seen: Sightings, size: tuple[int, int]) -> list[Trial]:
-    """Return the families with small misfits, best first."""
     some = seen.of(np.arange(0, len(seen.xy), math.ceil(len(seen.xy) / MAX_TRIAL_PICTURES)))
     few = [perspective(some, size), *(wide(some, size, family) for family in FAMILIES)]
     found = [_tried(seen, trial.camera) for trial in few]

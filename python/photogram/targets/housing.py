@@ -76,17 +76,14 @@ class Housing:
 
     @property
     def common(self) -> int:
-        """Number of common unknowns of the views."""
         return len(self.weights)
 
     @property
     def mean_motion(self) -> slice:
-        """Rows of the mean motion of the boards in the cofactors."""
         return slice(self.common, self.common + 6)
 
     @property
     def board(self) -> slice:
-        """Rows of the unknowns of the board."""
         return slice(self.common - self.points_by_board.shape[2], self.common)
 
     @cached_property
@@ -95,13 +92,11 @@ class Housing:
         return {}
 
     def parameters(self, camera: int) -> slice:
-        """Return the rows of a camera's parameters."""
         counts = [np.count_nonzero(unknown_of(each)) for each in self.cameras]
         start = sum(counts[:camera])
         return slice(start, start + counts[camera])
 
     def sensor(self, camera: int) -> slice:
-        """Return the rows of a camera's sensor, empty for the first camera."""
         end = self.parameters(len(self.cameras) - 1).stop + 6 * camera
         return slice(end - 6 if camera else end, end)
 
@@ -180,7 +175,6 @@ def size_of(calibrated: Calibrated, camera: int) -> tuple[int, int]:
 
 
 def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
-    """Return the housing of a camera, and the camera number in it."""
     cameras = housed_with(calibrated, camera)
     made = calibrated._housings
     if cameras[0] not in made:

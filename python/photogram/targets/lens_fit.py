@@ -66,8 +66,6 @@ class Moved:
 
 @dataclass(frozen=True, eq=False)
 class Points:
-    """Points with the target pixels of their projection."""
-
     points: Floats  # (m, 3) in axes of the other lens; directions if the points are not finite
     xy: Floats  # (m, 2) pixels
     finite: bool = False  # whether the points are at finite distances
@@ -288,8 +286,6 @@ HUBER_THETA_SQUARED = np.radians(5.0) ** 2  # the criterion of mrcal increases m
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Fitted motion between the axes of two cameras."""
-
     motion: Floats  # (4, 4) axes of camera a -> axes of camera b; without translation unless finite
     finite: bool  # whether the translation was fitted: all distances are finite
     points: int  # number of pixels of the fit, counted at every distance

@@ -10,6 +10,7 @@ through the views before and after. An image of another camera with time t shows
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from photogram.network.unknowns import Sensor
 from photogram.targets.corners import Corners
 from photogram.targets.vision import FLIP, composed, photo_poses
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibration
 
 CLOCK = "of "  # prefix of the camera in the name of its clock offset
 MAX_GAP_SECONDS = 0.2  # between views that determine the motion of the board
@@ -99,43 +103,32 @@ def moved(poses: Floats, motion: Floats, steps: Floats) -> Floats:
     return composed(rotation, -np.einsum("nij,nj->ni", rotation, places + own[:, :3]))
 
 
-def pictures_in_motion(
-    corners: Corners,
-    poses: Floats,
-    motion: Floats,
-    times: Floats,
-    sensors: Sequence[Sensor],
-    clocks: Sequence[Clock | None],
-) -> list[Timed]:
+def pictures_in_motion(calibration: Calibration, sensors: Sequence[Sensor]) -> list[Timed]:
     """Return the images as trajectories with unknown view poses and known motion."""
+    corners, tied = calibration.corners, calibration.tied
     assert corners.times is not None
-    places, attitudes = photo_poses(poses)
-    flights = []
+    places, attitudes = photo_poses(np.asarray(calibration.poses))
+    offsets, sd = np.asarray(calibration.offsets).tolist(), np.asarray(calibration.sd_offsets).tolist()
+    times, motion, flights = dated(corners, tied), np.asarray(calibration.motion), []
     for view, name in enumerate(corners.view_names()):
-        at, one = float(times[view]), slice(view, view + 1)
+        one = slice(view, view + 1)
         table = Table(times[one], places[one], times[one], attitudes.matrices[one])
-        position, rotation = (_known(at, motion[view, :, part]) for part in (slice(3), slice(3, 6)))
+        position, rotation = (
+            _known(float(times[view]), motion[view, :, part]) for part in (slice(3), slice(3, 6))
+        )
         flights.append(Trajectory(name, table, position, rotation))
+    ties = [
+        (sensors[k], Clock(CLOCK + name, offsets[k], sd[k])) if own else (None, None)
+        for k, (name, own) in enumerate(zip(corners.camera_names, tied.tolist(), strict=True))
+    ]
+    rows = zip(corners.views.tolist(), corners.times.tolist(), corners.cameras.tolist(), strict=True)
     return [
-        Timed(
-            picture,
-            flights[view],
-            time,
-            sensor=None if clocks[camera] is None else sensors[camera],
-            offset=clocks[camera],
-        )
-        for picture, view, camera, time in zip(
-            corners.pictures,
-            corners.views.tolist(),
-            corners.cameras.tolist(),
-            corners.times.tolist(),
-            strict=True,
-        )
+        Timed(name, flights[view], time, sensor=ties[camera][0], offset=ties[camera][1])
+        for name, (view, time, camera) in zip(corners.pictures, rows, strict=True)
     ]
 
 
 def _known(time: float, motion: Floats) -> Polynomial:
-    """Return a polynomial about a time with a free constant and fixed coefficients."""
     told = np.nan_to_num(motion)
     told = told[: int(np.flatnonzero(told.any(axis=1)).max(initial=-1)) + 1]
     value = np.vstack([np.zeros(3), told])

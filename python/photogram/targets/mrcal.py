@@ -51,7 +51,6 @@ SPLINED = re.compile(r"SPLINED_STEREOGRAPHIC_order=(\d+)_Nx=(\d+)_Ny=(\d+)_fov_x
 
 
 def lens_of_mrcal(model: str, values: Sequence[float], name: str = "") -> Camera:
-    """Return a fixed camera from its mrcal name and numbers."""
     said = model.removeprefix(PREFIX)
     if splined := SPLINED.fullmatch(said):
         order, nx, ny, fov = map(float, splined.groups())

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from itertools import product
+from itertools import islice, product
 
 import numpy as np
 
@@ -201,22 +201,27 @@ def shown_of(camera: Camera, size: Floats, places: Floats) -> tuple[Indices, Flo
 
 def added_by(housing: Housing, pose: Floats, sizes: Floats, sd: float) -> Added | None:
     """Return the effect of a view with corners of given sd (px); None if not visible."""
-    places = [transformed(each @ pose, housing.points) for each in housing.sensors]
-    shown = [shown_of(*own)[0] for own in zip(housing.cameras, sizes, places, strict=True)]
-    cameras, points = np.repeat(np.arange(len(shown)), [len(own) for own in shown]), np.concatenate(shown)
+    before, parts = housing.board.start, []
+    turned = housing.points @ pose[:3, :3].T
+    for number, (camera, size, sensor) in enumerate(
+        zip(housing.cameras, sizes, housing.sensors, strict=True)
+    ):
+        own, _ = shown_of(camera, size, transformed(sensor @ pose, housing.points))
+        _, by_point, by_common = housing.linearized(number, turned[own] + pose[:3, 3])
+        by_pose = by_point @ motion_partials(turned[own])
+        parts.append((own, by_common[:, :, :before] / sd, by_point @ pose[:3, :3] / sd, by_pose / sd))
+    points, by_cameras, by_place, by_pose = (np.concatenate(each) for each in zip(*parts, strict=True))
     if not len(points):
         return None
-    _, by_common, by_pose, by_place = view_rows(housing, pose, cameras, points)
-    before = housing.board.start
-    by_cameras = by_common[:, :, :before].reshape(-1, before) / sd
+    by_cameras = by_cameras.reshape(-1, before)
     touched = np.flatnonzero(by_cameras.any(axis=0))
     return Added(
         touched=touched,
         by_cameras=by_cameras[:, touched],
         places=before + 3 * points[:, np.newaxis] * (housing.points_by_board.shape[2] > 0) + np.arange(3),
-        by_place=by_place / sd,
-        by_pose=by_pose.reshape(-1, 6) / sd,
-        corners=np.bincount(cameras, minlength=len(housing.cameras)),
+        by_place=by_place,
+        by_pose=by_pose.reshape(-1, 6),
+        corners=np.array([len(own) for own, *_ in parts]),
     )
 
 
@@ -269,26 +274,6 @@ def best_views(
 def _rounded(value: float) -> float:
     """Round to six digits, so that the first of two mirrored views is chosen."""
     return float(f"{value:.6g}")
-
-
-def view_rows(
-    housing: Housing, pose: Floats, cameras: Indices, points: Indices
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return (n, 2) projections of board points by assigned cameras, and partials.
-
-    Partials are by the c common unknowns, (n, 2, c), by the pose step (dt, w), (n, 2, 6), and by point
-    coordinates, (n, 2, 3). The pose is (4, 4) board -> camera 0; cameras and points are (n,).
-    """
-    xy, by_pose, by_point = (np.empty((len(points), 2, *more)) for more in ((), (6,), (3,)))
-    by_common = np.zeros((len(points), 2, housing.common))
-    turned = housing.points[points] @ pose[:3, :3].T
-    for number in np.unique(cameras).tolist():
-        own = cameras == number
-        xy[own], in_first, by_common[own] = housing.linearized(number, turned[own] + pose[:3, 3])
-        by_point[own] = in_first @ pose[:3, :3]
-        by_common[own, :, housing.board] = by_point[own] @ housing.points_by_board[points[own]]
-        by_pose[own] = in_first @ motion_partials(turned[own])
-    return xy, by_common, by_pose, by_point
 
 
 DISTANCE_QUANTILES = (0.1, 0.5, 0.9)  # of the boards
@@ -361,7 +346,6 @@ def suggest_views(
 
 
 def candidate_views(housing: Housing, camera: int, size: tuple[int, int], board: Board) -> list[Candidate]:
-    """Return views at all image parts, three distances, tilts and rotations."""
     away = np.quantile(housing.board_distances(camera), DISTANCE_QUANTILES).tolist()
     to_first = inverted(housing.sensors[camera])
     counts = np.unique(housing.seen.views[housing.seen.cameras == camera], return_counts=True)[1]
@@ -378,19 +362,19 @@ def views_over_picture(
     `distances` are between board centre and camera. A board that must be detected as a `whole` is moved
     towards the image centre until it is completely visible.
     """
-    found = []
+
+    def is_shown(view: Candidate) -> bool:
+        places = transformed(view.pose, board.places)
+        return not whole or len(shown_of(camera, np.array(size), places)[0]) == len(places)
+
+    found: list[Candidate] = []
     steps = STEPS_TO_MIDDLE if whole else STEPS_TO_MIDDLE[:1]
     centre = (np.array(size) - 1) / 2
     for part in parts_of(size):
         tried = rays(camera, np.array([part.middle + step * (centre - part.middle) for step in steps]))
         tried = tried[np.isfinite(tried).all(axis=1)]
-        held = zip(*(views_towards(each, part.name, board, distances) for each in tried), strict=True)
-        for way in held:
-            for view in way:
-                places = transformed(view.pose, board.places)
-                if not whole or len(shown_of(camera, np.array(size), places)[0]) == len(places):
-                    found.append(view)
-                    break
+        ways = zip(*(views_towards(each, part.name, board, distances) for each in tried), strict=True)
+        found += [view for way in ways for view in islice(filter(is_shown, way), 1)]
     return found
 
 

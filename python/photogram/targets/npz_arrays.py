@@ -21,8 +21,6 @@ from photogram.words import phrase
 
 
 class Arrays:
-    """Named arrays of an archive, with its file for errors."""
-
     def __init__(self, path: Path, arrays: Mapping[str, NDArray[Any]]) -> None:
         self.path, self.arrays = path, arrays
 
@@ -31,7 +29,6 @@ class Arrays:
         return name in self.arrays and not (self.arrays[name].dtype.kind == "U" and self.text(name) == "")
 
     def refusal(self, code: str, name: str, **fields: object) -> InputError:
-        """Return an error that names an array."""
         return InputError(phrase(code, name=name, **fields), file=self.path)
 
     def first(self, *names: str) -> str:
@@ -42,7 +39,6 @@ class Arrays:
         return existing
 
     def text(self, name: str) -> str:
-        """Return an array of a single text."""
         with at_place(Place(self.path)):
             return text(name, self.arrays[name].tolist())
 
@@ -64,7 +60,6 @@ class Arrays:
 
 
 def read_arrays(path: Path, data: bytes) -> Arrays:
-    """Read an archive."""
     arrays = {}
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:

@@ -27,14 +27,12 @@ MAX_GRID_ERROR = 1e-6  # of points of a grid, in spacings
 
 
 def is_storage(path: Path) -> bool:
-    """Return whether an OpenCV file contains a corner matrix."""
     if path.suffix.lower() not in (".yml", ".yaml", ".xml", ".json"):
         return False
     return POINTS in read_beginning(path, BEGIN_BYTES)
 
 
 def is_npz(path: Path) -> bool:
-    """Return whether a file name has the suffix of an array archive."""
     return path.suffix.lower() == ".npz"
 
 

@@ -15,7 +15,6 @@ if TYPE_CHECKING:
 
 
 def pair(text: str) -> tuple[int, int]:
-    """Return two numbers with an x between them."""
     first, x, second = text.lower().partition("x")
     if not (x and first.strip().isdecimal() and second.strip().isdecimal()):
         raise ValueError("two numbers such as 10x7")
@@ -146,12 +145,10 @@ Into = Literal["odd", "halves"] | int
 
 
 def distances_of(text: str) -> list[float]:
-    """Return positive distances with commas between them."""
     return _numbers(text, None, "a list of distances, such as 1,inf")
 
 
 def _division(text: str) -> str | int | None:
-    """Return a division of the views for cross-validation."""
     if text in ("none", "odd", "halves"):
         return None if text == "none" else text
     if not (text.isdecimal() and int(text) > 1):

@@ -25,8 +25,6 @@ from photogram.words import phrase
 
 @dataclass(frozen=True, eq=False)
 class Rig:
-    """K cameras in pixels from 0 at the centre of the first."""
-
     cameras: tuple[Camera, ...]  # The cameras
     # Image width and height, pixels; None if unknown
     sizes: tuple[tuple[int, int] | None, ...]
@@ -35,16 +33,13 @@ class Rig:
 
     @property
     def names(self) -> list[str]:
-        """Camera names in files."""
         return [each.name or f"camera {row}" for row, each in enumerate(self.cameras)]
 
     @property
     def files(self) -> list[str]:
-        """Camera names as file names."""
         return ["".join(c if c.isalnum() or c in "-_." else "-" for c in each) for each in self.names]
 
     def tied(self, camera: int) -> bool:
-        """Return whether the pose of a camera relative to camera 0 is known."""
         return bool(np.isfinite(self.sensors[camera]).all())
 
     def size(self, camera: int) -> tuple[int, int]:
@@ -72,13 +67,11 @@ class Rig:
     def refusal(
         self, camera: int, title: str, models: Sequence[str], code: str = "targets.refused"
     ) -> InputError:
-        """Return the error of an unsupported camera, with the supported models."""
         fields = {"camera": self.names[camera], "model": self.cameras[camera].model, "to": "|".join(models)}
         return InputError(phrase(code, title=title, **fields))
 
 
 def rig_of(calibrated: Calibrated) -> Rig:
-    """Return the cameras of an adjusted calibration."""
     sensors = calibrated.sensors.copy()
     references = np.asarray(calibrated.calibration.references)
     sensors[(references != 0) & (np.arange(len(sensors)) > 0)] = np.nan

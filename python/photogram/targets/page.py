@@ -51,7 +51,6 @@ if TYPE_CHECKING:
 
 @np.errstate(over="ignore", invalid="ignore")
 def calibration_page(calibrated: Calibrated, page: Document) -> Document:
-    """Return the document of a calibration from the one of its block."""
     worth = calibrated.worth
     tables = [
         Table("splines", "Splined lenses", splines(calibrated), about=KNOTS),
@@ -149,7 +148,6 @@ def worth_section(worth: Worth | None) -> Section:
 
 
 def drawings(worth: Worth) -> list[Drawing]:
-    """Return all plots for later drawing."""
     found = [
         Drawing(f"map-{map_name(each)}", _title(each), CAPTION, partial(plot_uncertainty, each))
         for each in worth.maps
@@ -229,7 +227,6 @@ def worth_files(worth: Worth) -> dict[str, bytes]:
 
 
 def worth_members(worth: Worth) -> dict[str, Any]:
-    """Return the JSON members of the assessment."""
     maps = ("camera", "datum", "noise_only", "model", "distance", "columns", "rows", "sd", "covariances")
     return {
         "maps": [members(each, *maps, largest_where_seen="largest") for each in worth.maps],
@@ -275,7 +272,6 @@ NOTABLE_STRETCH = 3.0  # standard deviations of the spacing of a board
 
 
 def board_facts(calibrated: Calibrated) -> list[Fact]:
-    """Return facts on the board."""
     calibration = calibrated.calibration
     board, unit = calibration.board, calibration.board.unit
     found = [
@@ -313,8 +309,6 @@ STRETCHES = ("scale x", "scale y", "shear")
 
 @dataclass(frozen=True, eq=False)
 class BoardFit:
-    """Adjusted points of a board relative to their nominal coordinates."""
-
     plane: Floats  # (3,) a, b, c of z = a + b x + c y, fitted to the adjusted points
     rms_out_of_plane: float  # Root mean square of z about the plane, in the unit of the board
     # (3,) in ppm, with standard deviations: relative excess of the spacing along x and y. The third is the
@@ -354,7 +348,6 @@ def board_fit(calibrated: Calibrated) -> BoardFit | None:
 
 
 def prior_shift(calibrated: Calibrated) -> list[Quantity]:
-    """Return parameter changes by priors, absolute and relative to the sd."""
     before = calibrated.unregularised
     rows = [
         (own, k, float(own.values[k] - free.values[k]))

@@ -41,7 +41,6 @@ ROUGH_KNOTS, ACROSS = 0.04, 10.0
 def regularised(
     cameras: Sequence[Camera], sizes: Sequence[tuple[int, int] | None], observed: int
 ) -> list[Camera]:
-    """Return cameras with mrcal priors on their free parameters."""
     terms = [[name for name in each.names if name not in CORE and _free(each, name)] for each in cameras]
     count = sum(map(len, terms))
     mu = math.sqrt(SHARE * observed / (2 * len(cameras) * FAR**2))
@@ -74,7 +73,6 @@ def regularised(
 
 
 def weighted_block(start: Calibration) -> Block:
-    """Return the block of a calibration with the priors of its cameras."""
     if start.regularise is None:
         return start.block()
     observed = 2 * len(start.board.places) * len(start.corners.pictures)

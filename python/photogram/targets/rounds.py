@@ -48,7 +48,6 @@ def _in_motion(start: Calibration, result: Result) -> Calibration:
 
 
 def has_knots(start: Calibration) -> bool:
-    """Return whether a camera has unknown knots."""
     return any(each.knot_unknowns for each in start.cameras)
 
 

@@ -178,8 +178,6 @@ _MIN_ORDER_DIFFERENCE = 1e-6  # relative to the extent of the board
 
 @dataclass(frozen=True, eq=False)
 class Listings:
-    """Possible corner orders of a board, the numbered one first."""
-
     points: Indices  # (g, n) board point of the k-th corner of a list
     # First of the orders that differ by more than a board symmetry: homographies separate only these
     shapes: tuple[int, ...]
@@ -226,8 +224,6 @@ def _listed(i: Indices, j: Indices, columns: int, rows: int) -> list[Indices]:
 
 @dataclass(frozen=True, eq=False)
 class Sightings:
-    """Board observations in P images."""
-
     places: Floats  # (n, 3) board points, in axes whose x and y are in its plane, if it is flat
     axes: Floats  # (4, 4) board -> these axes; the identity except for arbitrary points
     listings: Listings  # Possible orders of its corners
@@ -276,7 +272,6 @@ class Sightings:
         return found
 
     def of(self, rows: Indices | Bools) -> Self:
-        """Return a subset of the images."""
         return replace(self, xy=self.xy[rows], sd=self.sd[rows])
 
     def listed(self, orders: Indices) -> Self:

@@ -349,7 +349,6 @@ class PicturePart(NamedTuple):
 
 
 def parts_of(size: tuple[int, int]) -> list[PicturePart]:
-    """Return the parts of an image row by row."""
     across, down = (
         [(each + 0.5) / count * (side - 1) for each in range(count)]
         for count, side in zip(PARTS, size, strict=True)

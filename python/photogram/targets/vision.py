@@ -140,7 +140,6 @@ def touched(camera: Camera, points: Floats) -> Imaged:
 
 
 def has_unknown_knots(camera: Camera) -> bool:
-    """Return whether a camera has unknown knots."""
     return bool(unknown_of(camera)[len(camera.names) :].any())
 
 

@@ -12,7 +12,6 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError, message_of
 from photogram.film.distances import with_datum
-from photogram.film.validity import age_remark, changed_remark, valid_certificate
 from photogram.formats.plain.tables import Tables, columns_of
 from photogram.formats.plain.unknowns import Covariances
 from photogram.io.column_table import ColumnTable
@@ -55,6 +54,10 @@ def read_certificates(tables: Tables) -> dict[str, Certificate]:
             raise table.cell_error(row, "certificate", "plain.other-certificate", **fields)
     several = {camera: [_read(path, camera)] for camera, path in files.items()}
     several |= _of_settings(tables, [camera for camera in flown if camera not in files])
+    if not several:
+        return {}
+    from photogram.film.years import age_remark, changed_remark  # imported on demand
+
     certificates = {camera: _valid(table, camera, own, flown[camera]) for camera, own in several.items()}
     for camera, own in certificates.items():
         remarks: list[str | Phrase] = list(own.told())
@@ -74,6 +77,8 @@ def _valid(
     table: ColumnTable, camera: str, several: Sequence[Certificate], flown: Mapping[date | None, int]
 ) -> Certificate:
     """Return the certificate of a camera that is valid on all of its flight dates."""
+    from photogram.film.years import valid_certificate
+
     found: Certificate | None = None
     for day, row in flown.items():
         try:

@@ -1,4 +1,4 @@
-"""Comparison of the calibrations of each camera over time.
+"""Calibrations of each camera over time: the valid certificate, and their comparison.
 
 The comparison does not depend on camera model and balancing. Principal distance and radial terms are
 correlated, and laboratories balance curves differently, so parameters cannot be compared. In the field common
@@ -17,17 +17,21 @@ from datetime import date
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.errors import InputError
+from photogram.errors import ContradictionError, InputError
 from photogram.film.certificate import Certificate
 from photogram.history.changes import History, dates_of, history
+from photogram.history.document import history_document, history_findings
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.show.methods import Documented, Judged
-from photogram.show.page import Document
+from photogram.show.page import Document, Fact
+from photogram.show.quantity import Axis, Quantity, Table
 from photogram.statistics.distributions import LEVEL
-from photogram.statistics.findings import Findings
+from photogram.statistics.findings import Findings, Tested
 from photogram.words import Phrase, phrase
 
+MAX_AGE_YEARS = 3.0  # Cameras are recalibrated after this time at the latest
+_DAYS_OF_YEAR = 365.25
 NODES = 9  # radii, Gauss-Legendre nodes
 AZIMUTHS = 12
 STEP = 0.01  # of numerical differences, in standard deviations
@@ -207,14 +211,43 @@ class CameraComparison(Documented, Judged):
 
     def document(self) -> Document:
         """Return the document with changes, control charts, calibrations and all values."""
-        from photogram.film.years.document import comparison_document
-
-        return comparison_document(self)
+        return history_document(
+            "Calibrations of cameras over years",
+            _calibrations(self.calibrations),
+            self.histories,
+            self.verdict,
+            "cameras",
+            {name: {"angle_rad": angle} for name, angle in self.angles.items()},
+            about=FIGURES,
+            highlights=[
+                Fact.of(f"{name[:1].upper()}{name[1:]} compared up to", math.degrees(angle), "°", decimals=1)
+                for name, angle in self.angles.items()
+            ],
+            members={"remarks": [*map(str, self.remarks)]},
+        )
 
     def _findings(self) -> Findings:
-        from photogram.film.years.document import comparison_findings
-
-        return comparison_findings(self)
+        # Values with a detected change are not tested again.
+        quiet = [
+            (whose, history, own)
+            for whose, history in self.histories.items()
+            for own in history.series
+            if not own.changes
+        ]
+        places = [
+            f"{own.name} of {whose} on {occasion}"
+            for whose, history, own in quiet
+            for occasion in history.occasions
+        ]
+        values = np.concatenate([own.off / own.off_sd for *_, own in quiet] or [np.zeros(0)])
+        return history_findings(
+            self.histories,
+            observations=[Tested("values beside those of the others", values, lambda at: places[at[0]], "w")],
+            degrees_of_freedom=sum(own.constancy.degrees_of_freedom for own in self.histories.values()),
+            untested=Phrase("untested.constancy"),
+            remarks=self.remarks,
+            if_withheld=[Phrase("advice.certificate-of-time")],
+        )
 
 
 def compare_cameras(
@@ -297,3 +330,69 @@ def _history(records: Sequence[DatedCamera], angle: float, level: float) -> tupl
         level=level,
     )
     return compared, found.held
+
+
+ANGLE = (Axis.turned("", "deg"),)
+
+
+def _calibrations(found: Sequence[DatedCamera]) -> Table:
+    angles = np.array([np.nan if each.angle is None else each.angle for each in found])
+    columns = [
+        Quantity([each.day.isoformat() for each in found], kind="name", member="day", head="Day"),
+        Quantity([each.camera.title for each in found], kind="name", member="camera", head="Camera"),
+        Quantity([each.camera.model for each in found], kind="name", member="model", head="Model"),
+        Quantity(angles, ANGLE, "value", member="angle_rad", head="Up to", decimals=1),
+        Quantity([each.source for each in found], kind="name", member="source", head="From"),
+    ]
+    return Table("calibrations", "Calibrations", columns)
+
+
+FIGURES = (
+    "Images of directions are compared within the angle that all calibrations have in common: a shift, the"
+    " principal distance that suits the whole field, radial shapes of third, fifth and seventh degree,"
+    " decentring, affinity and shear, as they move an image at the edge."
+)
+
+
+def valid_certificate(certificates: Sequence[Certificate], day: date | None) -> Certificate:
+    """Return the certificate valid on a day: the last before, else the first after.
+
+    InputError: if there are several certificates and no day of the flight, or one without a date.
+    ContradictionError: if two certificates have the same date.
+    """
+    if len(certificates) == 1:
+        return certificates[0]
+    if day is None:
+        raise InputError(phrase("films.several-certificates"))
+    dated: dict[date, Certificate] = {}
+    for certificate in certificates:
+        if certificate.day is None:
+            raise InputError(phrase("films.undated", certificate=certificate.name), file=certificate.file)
+        if certificate.day in dated:
+            other = getattr(dated[certificate.day].file, "name", certificate.name)
+            message = phrase("films.same-date", day=str(certificate.day), other=other)
+            raise ContradictionError(message, file=certificate.file)
+        dated[certificate.day] = certificate
+    return dated[max((each for each in dated if each <= day), default=min(dated))]
+
+
+def age_remark(certificate: Certificate, day: date) -> str | Phrase:
+    """Return a warning if a certificate is far older than a flight or later, else ""."""
+    if certificate.day is None:
+        return phrase("films.undated-flight", day=str(day))
+    years = (day - certificate.day).days / _DAYS_OF_YEAR
+    if 0 <= years <= MAX_AGE_YEARS:
+        return ""
+    code = "films.before-flight" if years > 0 else "films.after-flight"
+    return phrase(code, certificate=str(certificate.day), years=abs(years), day=str(day))
+
+
+def changed_remark(chosen: Certificate, several: Sequence[Certificate], day: date) -> str | Phrase:
+    """Return a warning if a camera changed between its certificates around a flight."""
+    later = [each for each in several if each.day is not None and each.day > day and each is not chosen]
+    if chosen.day is None or chosen.day > day or not later or chosen.c is None:
+        return ""
+    after = min(later, key=lambda each: each.day or day)
+    if after.c is None or compare_cameras([chosen, after]).verdict.code != "changed":
+        return ""
+    return phrase("films.changed", before=str(chosen.day), after=str(after.day), day=str(day))
