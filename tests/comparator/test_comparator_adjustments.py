@@ -18,8 +18,14 @@ from photogram.comparator import (
     simulate_calibration,
 )
 from photogram.comparator.case import locations
-from photogram.comparator.fits import decomposition_jacobian, fit_affine, fit_rigid, rotation_matrix
-from photogram.comparator.polynomial import design, fit_polynomial
+from photogram.comparator.fits import (
+    decomposition_jacobian,
+    design,
+    fit_affine,
+    fit_polynomial,
+    fit_rigid,
+    rotation_matrix,
+)
 
 POINTS = np.arange(1, 26)
 GRID = Grid.square().xy_um

@@ -11,8 +11,8 @@ from message_codes import described, refusal
 from photogram import InputError
 from photogram.comparator import Correction, Grid, Options, calibrate, simulate_calibration, to_csv
 from photogram.comparator.averages import Reduction
-from photogram.comparator.combined_solution import CombinedPolynomial
 from photogram.comparator.outliers import far_pointings, pointing_tests, screen
+from photogram.comparator.variance import CombinedPolynomial
 from photogram.words import phrase
 
 

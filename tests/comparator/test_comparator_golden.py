@@ -10,7 +10,7 @@ from photogram.comparator import built_in_grid
 from photogram.comparator.averages import LocationAverages, PlateAverages, listed_grid_sigma
 from photogram.comparator.case import exchanged
 from photogram.comparator.fits import fit_rigid
-from photogram.comparator.listing.parameters import table_nodes
+from photogram.comparator.listing import table_nodes
 from photogram.comparator.variance import AxisSigma, difference
 
 

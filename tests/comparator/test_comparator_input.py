@@ -23,8 +23,8 @@ from photogram.comparator import (
     to_cards,
     to_csv,
 )
-from photogram.comparator.cards import join_least_count
 from photogram.comparator.case import close_out, detect_orientation, intersect_legs, reduce_legs
+from photogram.comparator.measurements import join_least_count
 from photogram.comparator.pointing import group, group_as_listed
 
 

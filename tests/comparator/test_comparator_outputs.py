@@ -23,7 +23,7 @@ from photogram.comparator.case import exchanged
 from photogram.comparator.correction import partials_of
 from photogram.comparator.fits import rotation_matrix
 from photogram.comparator.joint import Weights, adjust_jointly
-from photogram.comparator.listing.parameters import correction_table, table_nodes
+from photogram.comparator.listing import correction_table, table_nodes
 from photogram.comparator.tables import LINEAR
 from photogram.comparator.variance import AxisSigma, _f_max_tail, compare_case_variances, difference
 from photogram.show.sketch.marks import Ellipses

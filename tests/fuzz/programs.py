@@ -51,7 +51,7 @@ class Watch:
         ("photogram", "orient"),
         ("photogram.giant.checking", "check"),
         ("photogram.collection", "adjust"),
-        ("photogram.perspective_center.batch", "determine"),
+        ("photogram.perspective_center.deck", "determine"),
         ("photogram.comparator", "calibrate"),
         ("photogram.stellar", "calibrate"),
         ("photogram.stellar.night_calibration", "calibrate_night"),

@@ -23,10 +23,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.case import PlacedCase, exchanged, locations
-from photogram.comparator.combined_solution import CombinedLinear, CombinedPolynomial
-from photogram.comparator.fits import Residuals, rotation_matrix
+from photogram.comparator.fits import Frame, Residuals, design, rotation_matrix
 from photogram.comparator.grid import Grid
-from photogram.comparator.polynomial import Frame, design
+from photogram.comparator.variance import CombinedLinear, CombinedPolynomial
 from photogram.lazy_dataclasses import dataclass
 
 SAME_PLACE = 0.25  # Locations closer than this part of the plate spacing are equal

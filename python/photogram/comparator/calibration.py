@@ -17,14 +17,6 @@ from photogram.comparator.averages import (
     text_grid_sigma,
 )
 from photogram.comparator.case import Closeout, PlacedCase, close_out, place_case
-from photogram.comparator.combined_solution import (
-    CombinedLinear,
-    CombinedPolynomial,
-    SinglePolynomial,
-    combine_linear,
-    combine_polynomial,
-    single_polynomial,
-)
 from photogram.comparator.correction import Correction, Identity, parameters_of
 from photogram.comparator.fits import AffineFit, Residuals, RigidFit, fit_affine, fit_rigid
 from photogram.comparator.grid import Grid, with_corrections
@@ -44,11 +36,17 @@ from photogram.comparator.pointing import Precision, pool_points
 from photogram.comparator.readings import Case, Session
 from photogram.comparator.variance import (
     CaseVarianceTest,
+    CombinedLinear,
+    CombinedPolynomial,
     PolynomialTest,
+    SinglePolynomial,
     VarianceAnalysis,
     analyse_variance,
+    combine_linear,
+    combine_polynomial,
     compare_case_variances,
     polynomial_tests,
+    single_polynomial,
 )
 from photogram.errors import AdjustmentError, message_of
 from photogram.lazy_dataclasses import dataclass, replace

@@ -16,11 +16,10 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.case import PlacedCase
-from photogram.comparator.combined_solution import CombinedLinear
 from photogram.comparator.correction import PARAMETERS, Correction
-from photogram.comparator.fits import Residuals, rotation_matrix
+from photogram.comparator.fits import COUNT, Frame, Polynomial, Residuals, rotation_matrix
 from photogram.comparator.grid import Grid
-from photogram.comparator.polynomial import COUNT, Frame, Polynomial
+from photogram.comparator.variance import CombinedLinear
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.limits import GlobalTest, global_test

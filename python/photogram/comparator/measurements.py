@@ -12,14 +12,290 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.objects import path_of, require
-from photogram.comparator.cards import MAX_LEG, check_number, read_cards
 from photogram.comparator.csvfile import Keys, Table, read_table, settings_lines, switch, text_of
-from photogram.comparator.grid import Grid, find_grid
+from photogram.comparator.grid import BUILT_IN, Grid, built_in_grid, find_grid
 from photogram.comparator.readings import LARGEST_UM, Reading, Session, collect_cases
 from photogram.errors import InputError
 from photogram.io.numbers import is_whole_number
-from photogram.io.places import Place, at_place
-from photogram.words import phrase
+from photogram.io.places import Failing, Place, at_place
+from photogram.io.records import Record, Source
+from photogram.lazy_dataclasses import dataclass, replace
+from photogram.messages import Message
+from photogram.words import Phrase, phrase
+
+SPECIAL_GRID, MAX_COMPARATOR = 3, 15
+CASES = 20  # operators in a header
+MAX_LEG = 4
+
+
+@dataclass(frozen=True)
+class Header:
+    """The header card, FORMAT (5I1,I2,A1,1X,20I3,2X,A8,I1)."""
+
+    left_handed: bool  # Columns 1 to 5
+    sorted_input: bool
+    other_least_count: bool  # Not one micrometre (comparator 11 has separate unit digits)
+    skip_card: bool  # Skip one card before the data
+    plot_each_case: bool  # As in the text (the listing reverses it)
+    comparator: int  # Columns 6-7; 0 ends the job
+    secondary: bool  # Column 8 holds R: the right stage of a stereocomparator
+    operators: tuple[int, ...]  # Columns 10-69: operator of each case, 0 if none
+    date: str  # Columns 72-79
+    master: int  # Column 80: 0 grid 773, 1 grid 1320, 2 grid 778, 3 special coordinates follow
+
+
+@dataclass(frozen=True)
+class _Format:
+    """Columns (first, last) of a data card; x and y are Fw.d in metres (`decimals`)."""
+
+    plate_case: tuple[int, int]
+    leg: int
+    point: tuple[int, int]
+    x: tuple[int, int]
+    y: tuple[int, int]
+    decimals: int
+    plate: tuple[int, int] | None = None
+
+
+# Formats 122 and 143, with an additional centre of the range (TRANS, F9.6)
+STANDARD = _Format((3, 7), 8, (9, 10), (12, 21), (22, 31), 8)
+TRANS = (61, 69)
+TRANS_ON_CARDS = 15  # The comparator whose cards contain it
+SECONDARY = _Format((3, 7), 8, (9, 10), (32, 41), (42, 51), 8)  # Format 146: right stage of the STK1
+PSK_LEFT = _Format((2, 3), 4, (5, 6), (20, 25), (30, 35), 6, plate=(8, 10))  # Format 123
+PSK_RIGHT = _Format((6, 7), 8, (9, 10), (40, 45), (50, 55), 6, plate=(2, 5))  # Format 124
+# Subroutine MICRON: separate unit digits in columns 3 and 4
+LEAST_COUNT = _Format((5, 7), 8, (9, 10), (11, 19), (20, 29), 6)
+
+
+def _integer(record: Record, first: int, last: int) -> int:
+    """Read an Iw field with blanks as zeros."""
+    digits = record.columns(first, last).ljust(last - first + 1).lstrip(" ").replace(" ", "0")
+    if digits and not (digits.isascii() and digits.isdigit()):
+        raise _refusal(record, first, last, phrase("error.whole", value=record.columns(first, last)))
+    return int(digits or 0)
+
+
+def _refusal(record: Record, first: int, last: int, message: Phrase) -> InputError:
+    return record.error(phrase("error.columns", first=first, last=last, message=message))
+
+
+def _micrometres(record: Record, columns: tuple[int, int], decimals: int) -> float:
+    """Read an Fw.d field in metres, blanks as zeros, as micrometres."""
+    first, last = columns
+    text = record.columns(first, last).ljust(last - first + 1).lstrip(" ")
+    sign, digits = (-1, text[1:]) if text.startswith("-") else (1, text.removeprefix("+"))
+    whole, point, fraction = digits.partition(".")
+    figures = (whole + fraction).replace(" ", "0")
+    if figures and not (figures.isascii() and figures.isdigit()):
+        raise _refusal(record, first, last, phrase("error.number", value=record.columns(first, last)))
+    places = len(fraction) if point else decimals
+    return sign * int(figures or 0) * 1e6 / float(10**places)
+
+
+def _header(record: Record) -> Header:
+    flags = [_integer(record, column, column) != 0 for column in range(1, 6)]
+    header = Header(
+        left_handed=flags[0],
+        sorted_input=flags[1],
+        other_least_count=flags[2],
+        skip_card=flags[3],
+        plot_each_case=flags[4],
+        comparator=_integer(record, 6, 7),
+        secondary=record.columns(8, 8) == "R",
+        operators=tuple(_integer(record, 10 + 3 * case, 12 + 3 * case) for case in range(CASES)),
+        date=record.columns(72, 79).strip(" "),
+        master=_integer(record, 80, 80),
+    )
+    if header.comparator > MAX_COMPARATOR:
+        raise _refusal(record, 6, 7, phrase("error.most", high=MAX_COMPARATOR, value=header.comparator))
+    if header.master > SPECIAL_GRID:
+        raise _refusal(record, 80, 80, phrase("error.most", high=SPECIAL_GRID, value=header.master))
+    return header
+
+
+def _format(header: Header) -> _Format:
+    """Return the data card format (comparator numbers: report, section II)."""
+    if header.secondary:
+        return SECONDARY
+    if header.comparator == 11 and header.other_least_count:
+        return LEAST_COUNT
+    return {12: PSK_LEFT, 13: PSK_RIGHT}.get(header.comparator, STANDARD)
+
+
+def join_least_count(coarse: int, unit: int) -> int:
+    """Join a coarse reading and its separate unit digit (subroutine MICRON)."""
+    tens, digit = divmod(coarse, 10)
+    if abs(digit - unit) <= 5:
+        return 10 * tens + unit
+    return 10 * tens + unit + (10 if unit < digit else -10)
+
+
+def _plate_case(record: Record, columns: tuple[int, int]) -> tuple[int, int]:
+    """Split KASE, 100 x plate + case."""
+    text = record.columns(*columns)
+    digits = text.strip(" ")
+    if len(digits) == 5 and digits.endswith("0"):
+        digits = digits[:-1]
+    if not (digits.isascii() and digits.isdigit()):
+        raise _refusal(record, *columns, phrase("comparators.plate-case", value=text))
+    return int(digits[:-2] or 0), int(digits[-2:])
+
+
+def check_number(place: Failing, what: str, number: int, low: int, high: int) -> None:
+    """Reject a case or leg number outside its range."""
+    with at_place(place):
+        require(low <= number <= high, what, "range", value=number, low=low, high=high)
+
+
+class _Deck:
+    def __init__(self, cards: Iterator[Record], header: Header, first: Record, grids: Iterable[Grid]) -> None:
+        self.header = header
+        self.first = first
+        self.cards = cards
+        self.messages: list[Message] = []
+        self.centre_um: float | None = None
+        special = self._special_grid() if header.master == SPECIAL_GRID else None
+        master = special or built_in_grid(BUILT_IN[min(header.master, 2)])
+        self.grids = {grid.number: grid for grid in [*grids] or [master]}
+        if special is not None:
+            self.messages.append(first.message(phrase("comparators.special-grid", plate=special.number)))
+
+    def _special_grid(self) -> Grid:
+        points, xy = [], []
+        for card in self.cards:
+            points.append(_integer(card, *STANDARD.point))
+            xy.append([_micrometres(card, columns, 8) for columns in (STANDARD.x, STANDARD.y)])
+            if not card.blank(80, 80):
+                number = 1000 * self.header.operators[18] + self.header.operators[19]
+                return Grid(number, np.array(points), np.array(xy))
+        raise self.first.error(phrase("comparators.grid-end"))
+
+    def session(self) -> Session:
+        if self.header.skip_card:
+            next(self.cards, None)
+        layout = _format(self.header)
+        readings: list[Reading] = []
+        for card in self.cards:
+            if card.blank(1, 80):
+                break
+            reading = self._reading(card, layout)
+            if reading.xy_um == (0.0, 0.0):
+                self.messages.append(card.message(phrase("comparators.zero-readings", point=reading.point)))
+            else:
+                readings.append(reading)
+        session = Session(
+            cases=collect_cases(readings),
+            grids=self.grids,
+            comparator=self.header.comparator,
+            secondary=self.header.secondary,
+            date=self.header.date,
+            left_handed=self.header.left_handed,
+            sorted_input=self.header.sorted_input,
+            least_count_one_micrometre=not self.header.other_least_count,
+            plot_each_case=self.header.plot_each_case,
+            range_centre_um=self.centre_um,
+            source=self.first.source.path,
+            messages=self.messages,
+        )
+        if not session.cases:
+            raise self.first.error(phrase("comparators.empty-deck"))
+        session.check()
+        return session
+
+    def _reading(self, card: Record, layout: _Format) -> Reading:
+        if self.header.comparator == TRANS_ON_CARDS and not card.blank(*TRANS):
+            self.centre_um = _micrometres(card, TRANS, 6)
+        plate, case = _plate_case(card, layout.plate_case)
+        if layout.plate is not None:
+            plate = _integer(card, *layout.plate)
+        check_number(card, "case", case, 1, CASES)
+        leg = _integer(card, layout.leg, layout.leg)
+        check_number(card, "leg", leg, 0, MAX_LEG)
+        xy = [_micrometres(card, columns, layout.decimals) for columns in (layout.x, layout.y)]
+        if layout is LEAST_COUNT:
+            xy = [float(join_least_count(round(xy[k]), _integer(card, 3 + k, 3 + k))) for k in range(2)]
+        return Reading(
+            plate=self._plate(card, plate),
+            case=case,
+            operator=self.header.operators[case - 1],
+            leg=leg,
+            point=_integer(card, *layout.point),
+            xy_um=(xy[0], xy[1]),
+            place=card.place,
+        )
+
+    def _plate(self, card: Record, digits: int) -> int:
+        """Return the plate number that ends with given digits; blank: the only plate."""
+        if digits == 0 and len(self.grids) == 1:
+            return next(iter(self.grids))
+        plates = [number for number in self.grids if digits in (number, number % 100)]
+        if len(plates) != 1:
+            fields = {"kind": "plate", "name": f"{digits:02d}", "names": [*map(str, self.grids)]}
+            raise card.error(phrase("error.unknown", **fields))
+        return plates[0]
+
+
+def read_cards(path: Path, grids: Iterable[Grid] = (), *, left_handed: bool | None = None) -> list[Session]:
+    """Read the decks of a file.
+
+    Parameters
+    ----------
+    path
+        File with 80 columns per record.
+    grids
+        Plates that replace the one in the header.
+    left_handed
+        Whether the comparator is left-handed relative to the plate. It overrides the headers.
+
+    Raises
+    ------
+    InputError
+        If the file or a card cannot be read. The message names the record.
+    """
+    path = path_of("path", path)
+    source = Source.read(path)
+    cards = (source.record(number) for number in range(1, len(source.lines) + 1))
+    sessions = []
+    for first in cards:
+        header = _header(first)
+        if header.comparator == 0:
+            break
+        session = _Deck(cards, header, first, list(grids)).session()
+        sessions.append(session if left_handed is None else replace(session, left_handed=left_handed))
+    if not sessions:
+        raise InputError(phrase("comparators.no-deck"), file=path)
+    return sessions
+
+
+def to_cards(session: Session) -> bytes:
+    """Return a session as a deck in the standard format 122, ending with a blank card.
+
+    Raises
+    ------
+    InputError
+        If the session does not use exactly one of the three master grids, or exceeds the columns.
+    """
+    number = next(iter(session.grids))
+    if len(session.grids) != 1 or number not in BUILT_IN:
+        raise InputError(phrase("comparators.deck-grid", names=[*session.grids]))
+    operators = {case.number: case.operator for case in session.cases}
+    for case_number in operators:
+        check_number(Place(), "case", case_number, 1, CASES)
+    least_count = not session.least_count_one_micrometre
+    options = session.left_handed, session.sorted_input, least_count, False, session.plot_each_case
+    flags = "".join(str(int(bool(option))) for option in options)
+    named = "".join(f"{operators.get(case, 0):3d}" for case in range(1, CASES + 1))
+    stage = "R" if session.secondary else " "
+    lines = [f"{flags}{session.comparator:2d}{stage} {named}  {session.date:8.8}{BUILT_IN.index(number)}"]
+    for case in session.cases:
+        kase = 100 * (number % 100) + case.number
+        rows = zip(case.legs.tolist(), case.points.tolist(), case.xy_um.tolist(), strict=True)
+        lines += [
+            f"  {kase:5d}{leg:1d}{point:2d} {round(x * 100):10d}{round(y * 100):10d}"
+            for leg, point, (x, y) in rows
+        ]
+    return ("\n".join([*lines, ""]) + "\n").encode()
 
 
 def _centre(place: Place, text: str, key: str) -> float:

@@ -15,16 +15,16 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.comparator.averages import Reduction
 from photogram.comparator.case import PlacedCase, exchanged
-from photogram.comparator.combined_solution import (
+from photogram.comparator.fits import fit_affine, fit_rigid, rotation_matrix
+from photogram.comparator.grid import Grid
+from photogram.comparator.joint import JointFit
+from photogram.comparator.readings import Case, Session
+from photogram.comparator.variance import (
     CombinedLinear,
     CombinedPolynomial,
     combine_linear,
     combine_polynomial,
 )
-from photogram.comparator.fits import fit_affine, fit_rigid, rotation_matrix
-from photogram.comparator.grid import Grid
-from photogram.comparator.joint import JointFit
-from photogram.comparator.readings import Case, Session
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.comparator.case import exchanged
-from photogram.comparator.listing.parameters import table_nodes
+from photogram.comparator.listing import table_nodes
 from photogram.comparator.pointing import CONFIDENCE_FACTORS
 from photogram.errors import InputError
 from photogram.plots.picture_data import VectorField
@@ -39,8 +39,8 @@ from photogram.words import phrase
 if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.comparator import Calibration
+    from photogram.comparator.fits import Polynomial
     from photogram.comparator.pointing import Precision
-    from photogram.comparator.polynomial import Polynomial
 
 __all__ = ["sketches"]
 

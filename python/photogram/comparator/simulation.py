@@ -12,9 +12,8 @@ from photogram.arguments.types import Floats
 from photogram.comparator.calibration import Calibration, calibrate
 from photogram.comparator.case import exchanged
 from photogram.comparator.correction import Correction
-from photogram.comparator.fits import rotation_matrix
+from photogram.comparator.fits import Polynomial, rotation_matrix
 from photogram.comparator.grid import Grid, built_in_grid
-from photogram.comparator.polynomial import Polynomial
 from photogram.comparator.readings import Case, Session
 from photogram.errors import InputError
 from photogram.io.places import Place

@@ -9,10 +9,9 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.correction import Correction
-from photogram.comparator.fits import Decomposition, Residuals
+from photogram.comparator.fits import TERMS, Decomposition, Polynomial, Residuals
 from photogram.comparator.grid import Grid
 from photogram.comparator.outliers import FarPointing, Screening
-from photogram.comparator.polynomial import TERMS, Polynomial
 from photogram.comparator.variance import PolynomialTest
 from photogram.show.page import about, probability_written
 from photogram.show.quantity import Axis, Quantity, Table, component, members, members_of_each, of_each

@@ -1,7 +1,6 @@
 """Perspective centre of a projector (USGS Computer Contribution 2, 1969)."""
 
-from photogram.perspective_center.batch import Run, Stop, run_deck
-from photogram.perspective_center.deck import read_deck
+from photogram.perspective_center.deck import Run, Stop, read_deck, run_deck
 from photogram.perspective_center.grid import Coordinatograph, Grid, joined, reduce
 from photogram.perspective_center.solution import Cycle, PerspectiveCenter, determine
 

@@ -14,7 +14,7 @@ import fortranformat
 import numpy as np
 
 from photogram.errors import RankError
-from photogram.perspective_center.batch import Run
+from photogram.perspective_center.deck import Run
 from photogram.perspective_center.grid import MINUTES_PER_RADIAN, Grid
 from photogram.perspective_center.solution import INTERIOR, NOT_CONVERGED, SINGULAR, PerspectiveCenter
 

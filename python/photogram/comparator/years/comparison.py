@@ -20,8 +20,8 @@ from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.comparator.calibration import Calibration
 from photogram.comparator.correction import Correction, partials_of
+from photogram.comparator.fits import Frame, Polynomial
 from photogram.comparator.grid import Grid, with_corrections
-from photogram.comparator.polynomial import Frame, Polynomial
 from photogram.comparator.years.joint import Together, adjust_together
 from photogram.comparator.years.record import RecordedCalibration
 from photogram.errors import InputError

@@ -118,7 +118,7 @@ def _calibrated(path: Path, messages: list[Message]) -> _Numbers:
     Fixed components of a singular covariance matrix get a standard deviation of 0.001 um.
     """
     from photogram.comparator.correction import Correction
-    from photogram.comparator.polynomial import Frame
+    from photogram.comparator.fits import Frame
 
     own = Correction.read(path)
     frame = Frame.metres() if own.polynomial is None else own.polynomial.frame
