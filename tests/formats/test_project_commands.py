@@ -11,7 +11,7 @@ import pytest
 
 import photogram
 from photogram import adjust, formats
-from photogram.stellar.tomlfile import inputs
+from photogram.stellar.plain import inputs
 
 
 @pytest.mark.parametrize("kind", ["metrology", "survey", "rolling", "archive", "night"])

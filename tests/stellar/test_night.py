@@ -32,7 +32,7 @@ from photogram.stellar import (
 )
 from photogram.stellar.identification import stars_near
 from photogram.stellar.places import axis_of, pole_matrix, terrestrial
-from photogram.stellar.tomlfile import inputs
+from photogram.stellar.plain import inputs
 
 TRUTH = MAKER["CAMERA"].values
 

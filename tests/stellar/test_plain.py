@@ -15,7 +15,7 @@ from message_codes import as_check, coded, rejected
 from photogram import InputError
 from photogram.cli import app
 from photogram.stellar import ARCSEC, INDEX, Options, read_plain
-from photogram.stellar.tomlfile import inputs
+from photogram.stellar.plain import inputs
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = Path(str(files("photogram") / "examples" / "stellar" / "plate.toml"))

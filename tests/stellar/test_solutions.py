@@ -9,8 +9,13 @@ import star_plates as plates
 
 from message_codes import fields_of, has_code
 from photogram.stellar import ARCSEC, INDEX, NAMES, calibrate, refraction
-from photogram.stellar.curves import distortion_curves, histogram, refraction_curves, residual_classes
-from photogram.stellar.directions import mean_error_ellipses
+from photogram.stellar.curves import (
+    distortion_curves,
+    histogram,
+    mean_error_ellipses,
+    refraction_curves,
+    residual_classes,
+)
 from photogram.stellar.parameters import GROUPS
 from photogram.stellar.tables import star_means
 

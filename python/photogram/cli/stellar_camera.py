@@ -42,9 +42,8 @@ def stellar_camera(
     from photogram.stellar import calibrate
     from photogram.stellar.cameras import camera_document
     from photogram.stellar.deck import read_deck
-    from photogram.stellar.plain import read_plain
+    from photogram.stellar.plain import inputs, read_plain
     from photogram.stellar.printout import plate_list, printout
-    from photogram.stellar.tomlfile import inputs
 
     is_toml = deck.suffix.lower() == ".toml"
     problems = [read_plain(deck)] if is_toml else read_deck(deck)
@@ -99,8 +98,8 @@ def exposures(
     from photogram.io.places import Place, at_place
     from photogram.stellar.night_calibration import calibrate_night
     from photogram.stellar.night_file import read_night
+    from photogram.stellar.plain import inputs
     from photogram.stellar.sky_cameras import WITH_YAML, to_yaml
-    from photogram.stellar.tomlfile import inputs
 
     job.reads(*inputs(night))
     documents = replace(documents, out=documents.out or Path(f"{night.stem}-calibrated"))

@@ -7,7 +7,6 @@ from .night_calibration import calibrate_night as calibrate_night
 from .night_file import read_night as read_night
 from .night_result import CalibratedNight as CalibratedNight
 from .night_result import Night as Night
-from .options import Options as Options
 from .parameters import GRAD as GRAD
 from .parameters import INDEX as INDEX
 from .parameters import NAMES as NAMES
@@ -18,6 +17,7 @@ from .places import attitude_of as attitude_of
 from .places import sidereal_time as sidereal_time
 from .plain import read_plain as read_plain
 from .problem import Axis as Axis
+from .problem import Options as Options
 from .problem import Problem as Problem
 from .problem import default_parameters as default_parameters
 from .result import Result as Result

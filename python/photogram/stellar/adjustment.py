@@ -13,13 +13,11 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
 from photogram.stellar.findings import plate_tests
-from photogram.stellar.iteration import DIVERGED, iterate, iterate_as_published
+from photogram.stellar.iteration import DIVERGED, PreRun, Solved, iterate, iterate_as_published
 from photogram.stellar.movement import combine, movement, pairs_to_combine
-from photogram.stellar.options import core_threads
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES
-from photogram.stellar.problem import Problem
+from photogram.stellar.problem import Problem, core_threads
 from photogram.stellar.result import Result
-from photogram.stellar.state import PreRun, Solved
 from photogram.words import Phrase, phrase
 
 

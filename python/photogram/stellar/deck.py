@@ -14,9 +14,8 @@ from photogram.errors import InputError, message_of
 from photogram.io.angles import ARCSEC
 from photogram.io.places import at_place
 from photogram.io.records import Record, Source, parse_integer, parse_real
-from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, NAMES
-from photogram.stellar.problem import Axis, Problem, default_parameters, rejected
+from photogram.stellar.problem import Axis, Options, Problem, default_parameters, rejected
 from photogram.stellar.sky import Air, Site
 from photogram.words import Phrase, phrase
 

@@ -9,25 +9,17 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.lazy_dataclasses import dataclass, replace
-from photogram.network.neighbours import mutually_nearest
+from photogram.lazy_dataclasses import replace
 from photogram.stellar.matching import (
-    ACCEPTED,
-    DOUBTFUL,
-    FEWEST,
     STRETCH,
     Match,
     Search,
-    expected_false,
-    log_odds,
     match,
-    star_probabilities,
 )
 from photogram.stellar.places import apparent_places, sidereal_time
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, project_sky
 from photogram.stellar.sky_cameras import SkyCamera
-from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.stellar import Night
@@ -113,33 +105,6 @@ def stars_near(exposure: Exposure, camera: SkyCamera, site: Site, night: Night, 
     return np.flatnonzero(night.catalogue.directions @ centre >= math.cos(min(reach, math.pi)))
 
 
-@dataclass(frozen=True, eq=False)
-class Sighting:
-    """Candidate stars of an exposure, and their odds."""
-
-    match: Match
-    stars: Indices  # (k,) index in the catalogue by the best hypothesis, accepted or not; -1 for none
-    attitude: Floats  # (3,) alpha, omega, kappa from these stars; the given ones if there are too few
-
-    @property
-    def doubtful(self) -> bool:
-        """Return whether a rejected identification may be correct."""
-        return not self.match.accepted and self.match.expected <= DOUBTFUL
-
-    def reason(self) -> Phrase:
-        """Return why an exposure is rejected."""
-        if self.match.crowded:
-            return phrase("stars.crowded")
-        if len(self.stars) < FEWEST:
-            return phrase("stars.few-images", n=len(self.stars), least=FEWEST)
-        if self.match.stars < FEWEST:
-            return phrase("stars.few-stars", n=self.match.stars, least=FEWEST)
-        if not math.isfinite(self.match.expected):
-            return phrase("stars.no-pair", images=len(self.stars))
-        count = {"matched": self.match.matched, "images": self.match.images}
-        return phrase("stars.by-chance", **count, expected=self.match.expected, limit=ACCEPTED)
-
-
 def identify(
     exposure: Exposure,
     night: Night,
@@ -148,12 +113,17 @@ def identify(
     tolerance: float,
     stretch: float,
     tried: float = 0.0,
-) -> Sighting:
+) -> tuple[Match, Indices, Floats]:
     """Identify the catalogue stars of an exposure with an approximate attitude.
 
     The principal distance of the camera may have the relative error `stretch`. The tolerance is the largest
     distance of image and star after the best polynomials, pixels. `tried` is the number of earlier hypotheses
     about this exposure.
+
+    Returns
+    -------
+    The match; (k,) index in the catalogue by the best hypothesis, accepted or not, -1 for none; alpha, omega,
+    kappa from these stars, the given ones if there are too few.
     """
     frame, catalogue, dut1, radius = night.frame, night.catalogue, night.earth.dut1, attitude_radius(night)
     if stretch > STRETCH:
@@ -184,82 +154,4 @@ def identify(
         standard = site.standard_coordinates(places[local[rows]], time)
         attitude = turned_to(rays, local_directions(standard))
     stars = np.where(local >= 0, near[local], -1) if len(near) else local
-    return Sighting(matched, stars, attitude)
-
-
-@dataclass(frozen=True, eq=False)
-class StarImages:
-    """Stars of an exposure under a calibrated camera."""
-
-    stars: Indices  # (k,) catalogue star of each image, -1 for none
-    off: Floats  # (k,) largest coordinate difference of image and star, pixels; NaN for none
-    inside: int  # Catalogue stars in the frame
-    predicted: Floats  # (n, 2) predicted pixels of these and of stars within reach
-    nearest: Indices  # (k,) index of the star of each image among these; -1 for none
-    area: float  # Sky area of the frame, square pixels
-    xy: Floats  # (k, 2) the images
-    named: bool = False  # Whether the images name their stars
-
-    @property
-    def density(self) -> float:
-        """Catalogue stars per square pixel of the sky."""
-        return self.inside / self.area
-
-    def probabilities(self, sd: float) -> Floats:
-        """Return the probability (k,) of each star; NaN for missing or named stars.
-
-        `sd` is the standard deviation of an image coordinate.
-        """
-        if self.named:
-            return np.full(len(self.stars), np.nan)
-        return star_probabilities(self.xy, self.predicted, self.nearest, sd, self.density)
-
-    def log_odds(self, sd: float) -> float:
-        """Return the logarithmic odds of the exposure against chance (Lang et al.)."""
-        has = self.nearest >= 0
-        off = np.linalg.norm(self.xy[has] - self.predicted[self.nearest[has]], axis=1)
-        return log_odds(off, len(self.stars), sd, self.density)
-
-    def expected(self, limit: float, radius: float, roll: float) -> float:
-        """Return the expected number of wrong attitudes with an equally good match.
-
-        Attitudes are counted in steps of the limit (pixels). They cover the errors of the approximate
-        attitude (`radius`, pixels) and of its roll at the corners (`roll`, pixels).
-        """
-        mu = self.density * (2 * limit) ** 2
-        attitudes = (1 + 2 * radius / limit) ** 2 * (1 + 2 * roll / limit)
-        matched = int((self.off <= limit).sum())
-        return expected_false(len(self.stars), 2, mu, matched, attitudes)
-
-
-def identify_again(exposure: Exposure, night: Night, camera: SkyCamera, reach: float) -> StarImages:
-    """Find the nearest star within a reach (pixels) of each image, after calibration.
-
-    Named stars of images are unchanged.
-    """
-    frame, site, catalogue, dut1 = night.frame, night.site, night.catalogue, night.earth.dut1
-    near = stars_near(exposure, camera, site, night, 0.0)
-    named = exposure.stars
-    if named is not None:
-        near = np.union1d(near, named[named >= 0])
-    places = apparent_places(catalogue.take(near), exposure.utc, site.effects)
-    predicted = project_sky(camera, exposure.attitude, site, places, sidereal_time(site, exposure.utc, dut1))
-    with np.errstate(invalid="ignore"):
-        seen = ((predicted > -reach) & (predicted < np.array(frame) + reach)).all(axis=1)
-        in_frame = ((predicted >= 0) & (predicted <= frame)).all(axis=1)
-    inside = np.flatnonzero(seen)
-    nearest = np.full(len(exposure.xy), -1, np.int64)
-    if named is None:
-        nearest = mutually_nearest(exposure.xy, predicted[inside], reach)
-        local = np.where(nearest >= 0, inside[nearest], -1) if len(inside) else nearest
-        stars = np.where(local >= 0, near[local], -1)
-    else:
-        stars = named
-        local = np.where(named >= 0, np.searchsorted(near, named), -1)
-    off = np.full(len(local), np.nan)
-    has = local >= 0
-    off[has] = np.abs(exposure.xy[has] - predicted[local[has]]).max(axis=1)
-    area = frame[0] * frame[1] * sky_share(camera, exposure.attitude, frame)
-    return StarImages(
-        stars, off, int(in_frame.sum()), predicted[inside], nearest, area, exposure.xy, named is not None
-    )
+    return matched, stars, attitude

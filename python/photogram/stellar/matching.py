@@ -18,6 +18,7 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.neighbours import mutually_nearest
+from photogram.words import Phrase, phrase
 
 _SEEDS = 25  # Brightest images for hypotheses; three times this number support them
 _EXACT = 20  # Hypotheses with the most support, which are evaluated exactly
@@ -46,6 +47,24 @@ class Match:
         """Return whether the match is significant against chance."""
         return self.expected < ACCEPTED
 
+    @property
+    def doubtful(self) -> bool:
+        """Return whether a rejected identification may be correct."""
+        return not self.accepted and self.expected <= DOUBTFUL
+
+    def reason(self) -> Phrase:
+        """Return why an exposure is rejected."""
+        if self.crowded:
+            return phrase("stars.crowded")
+        if len(self.found) < FEWEST:
+            return phrase("stars.few-images", n=len(self.found), least=FEWEST)
+        if self.stars < FEWEST:
+            return phrase("stars.few-stars", n=self.stars, least=FEWEST)
+        if not math.isfinite(self.expected):
+            return phrase("stars.no-pair", images=len(self.found))
+        count = {"matched": self.matched, "images": self.images}
+        return phrase("stars.by-chance", **count, expected=self.expected, limit=ACCEPTED)
+
 
 @dataclass(frozen=True, eq=False)
 class Search:
@@ -69,6 +88,18 @@ class Search:
         middle = np.asarray(np.linalg.norm(predicted - self.axis, axis=1) <= inner, bool)
         return middle, math.pi * inner**2, math.pi * outer**2 * self.share
 
+    def as_deep(self, predicted: Floats, images: int) -> tuple[Floats, float]:
+        """Return the brightest predicted images for a number of measured ones, and their density.
+
+        The density is the number of stars per square pixel: in the frame or around it, whichever is larger.
+        """
+        width, height = self.frame
+        _, _, around = self.regions(predicted)
+        seen = width * height * self.share
+        chosen = predicted[: math.ceil(_DEEPER * max(images, _SEEDS) * around / seen)]
+        middle, area, around = self.regions(chosen)
+        return chosen, max(int(middle.sum()) / area, len(chosen) / around)
+
     def candidates(self, measured: Floats, predicted: Floats) -> Bools:
         """Return (m, n) whether image and star are possible pairs."""
         if self.axis is None:
@@ -77,28 +108,6 @@ class Search:
             )
         own, other = (np.linalg.norm(xy - self.axis, axis=1) for xy in (measured, predicted))
         return np.asarray(np.abs(own[:, None] - other[None]) <= self.radius, bool)
-
-
-@dataclass(frozen=True, eq=False)
-class _Sky:
-    """Predicted images with the depth of the measured ones, and their density."""
-
-    predicted: Floats  # (n, 2), brightest first
-    density: float  # Stars per square pixel: in the frame or around it, whichever is larger
-
-    @classmethod
-    def as_deep(cls, predicted: Floats, images: int, search: Search) -> _Sky:
-        """Return the brightest predicted images for a number of measured ones."""
-        width, height = search.frame
-        _, _, around = search.regions(predicted)
-        seen = width * height * search.share
-        chosen = predicted[: math.ceil(_DEEPER * max(images, _SEEDS) * around / seen)]
-        middle, area, around = search.regions(chosen)
-        return cls(chosen, max(int(middle.sum()) / area, len(chosen) / around))
-
-    def mu(self, tolerance: float) -> float:
-        """Return the mean number of stars in a tolerance area."""
-        return self.density * math.pi * tolerance**2
 
 
 def match(measured: Floats, predicted: Floats, search: Search, *, tolerance: float) -> Match:
@@ -114,57 +123,59 @@ def match(measured: Floats, predicted: Floats, search: Search, *, tolerance: flo
     if min(len(measured), len(predicted)) < FEWEST:
         return none
     seeds = measured[: 3 * _SEEDS]
-    bright = _Sky.as_deep(predicted, len(seeds), search)
-    made, promising = _similarities(seeds, bright.predicted, search, tolerance)
+    bright, density = search.as_deep(predicted, len(seeds))
+    made, promising = _similarities(seeds, bright, search, tolerance)
     # Includes both counts and earlier hypotheses.
     hypotheses = 2.0 * made + search.tried
     best, most = None, 2
     for transform in promising:
-        found = mutually_nearest(_apply(transform, seeds), bright.predicted, 3 * tolerance)
+        found = mutually_nearest(_apply(transform, seeds), bright, 3 * tolerance)
         matched = int((found >= 0).sum())
         if matched > most:
             best, most = transform, matched
-    expected = expected_false(len(seeds), 2, bright.mu(3 * tolerance), most, hypotheses)
     if best is None:
         return replace(none, hypotheses=hypotheses)
-    if bright.mu(3 * tolerance) > CROWDED:
-        expected = math.inf
-    sky = _Sky.as_deep(predicted, len(measured), search)
+    mu = _mean_stars(density, 3 * tolerance)
+    expected = math.inf if mu > CROWDED else expected_false(len(seeds), 2, mu, most, hypotheses)
+    sky, density = search.as_deep(predicted, len(measured))
     halves = np.arange(len(measured)) % 2 == 0
-    again = mutually_nearest(
-        _refined(measured, sky.predicted, best, tolerance, halves), sky.predicted, tolerance
-    )
-    held_out = int((again[~halves] >= 0).sum())
+    again = mutually_nearest(_refined(measured, sky, best, tolerance, halves), sky, tolerance)
+    held_out, tested = int((again[~halves] >= 0).sum()), int((~halves).sum())
     # Both images of a pair may be among the excluded ones.
-    second = expected_false(int((~halves).sum()), 2, sky.mu(tolerance), held_out, hypotheses)
-    crowded = sky.mu(tolerance) > CROWDED
+    second = expected_false(tested, 2, _mean_stars(density, tolerance), held_out, hypotheses)
+    crowded = _mean_stars(density, tolerance) > CROWDED
     counted = (most, len(seeds))
     if not crowded and second < expected:
-        expected, counted = second, (held_out, int((~halves).sum()))
-    moved = _refined(measured, sky.predicted, best, tolerance, np.ones(len(measured), bool))
+        expected, counted = second, (held_out, tested)
+    moved = _refined(measured, sky, best, tolerance, np.ones(len(measured), bool))
     return Match(
-        _certain(moved, sky, tolerance),
+        _certain(moved, sky, density, tolerance),
         expected,
         *counted,
-        crowded=crowded and bright.mu(3 * tolerance) > CROWDED,
+        crowded=crowded and mu > CROWDED,
         scale=math.hypot(best[0, 0], best[0, 1]),
         hypotheses=hypotheses,
         stars=len(predicted),
     )
 
 
-def _certain(moved: Floats, sky: _Sky, tolerance: float) -> Indices:
+def _mean_stars(density: float, tolerance: float) -> float:
+    """Return the mean number of stars in a tolerance area."""
+    return density * math.pi * tolerance**2
+
+
+def _certain(moved: Floats, predicted: Floats, density: float, tolerance: float) -> Indices:
     """Match images to stars if no other star is nearly as probable.
 
     Ambiguous images are matched with the calibrated camera.
     """
-    found = mutually_nearest(moved, sky.predicted, tolerance)
+    found = mutually_nearest(moved, predicted, tolerance)
     has = found >= 0
     if not has.any():
         return found
-    off = moved[has] - sky.predicted[found[has]]
+    off = moved[has] - predicted[found[has]]
     sd = max(1.4826 * float(np.median(np.abs(off))), 1e-3 * tolerance)
-    probability = star_probabilities(moved, sky.predicted, found, sd, sky.density)
+    probability = star_probabilities(moved, predicted, found, sd, density)
     return np.where(has & ~(probability >= CERTAIN), -1, found)
 
 

@@ -10,10 +10,9 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.stellar.iteration import iterate, residual_cycle
+from photogram.stellar.iteration import Solved, iterate, residual_cycle
 from photogram.stellar.parameters import GROUPS, NAMES
 from photogram.stellar.problem import Problem, core_problem
-from photogram.stellar.state import Solved
 
 if TYPE_CHECKING:
     from photogram.stellar import Result

@@ -9,25 +9,34 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Bools
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError, PhotogramError, message_of
 from photogram.io.angles import ARCSEC
 from photogram.messages import Message
 from photogram.statistics.weight_rules import LARGEST_FACTOR
-from photogram.stellar.blind import ATTITUDE_ERROR, FIELD_ERROR, locate
 from photogram.stellar.camera_tables import correlation_remarks
 from photogram.stellar.comparison import stood_still
 from photogram.stellar.identification import attitude_of_stars, has_named_stars
 from photogram.stellar.lens_choice import POSITIVE, LensFit, LensTest, test_scale, test_terms
 from photogram.stellar.night_result import CalibratedNight, Night
 from photogram.stellar.night_run import Run, adjusted
-from photogram.stellar.places import Earth
+from photogram.stellar.places import Earth, station_attitude
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration
 from photogram.stellar.sky_cameras import LENSES, SkyCamera
 from photogram.words import Phrase, phrase
+
+_ATTITUDE_ERROR, _FIELD_ERROR = math.radians(1.5), 0.05
+"""Largest errors of attitudes (radians) and of the principal distance (relative)."""
+_STEP = 1.3  # Ratio of consecutive fields of view; each covers half of the distance to the next
+_MAX_IMAGES = 200
+_TIMEOUT_MS = 5000
+_MAGNITUDES = (6.0, 9.0)  # Faintest stars for fields of 40 and of 5 degrees
+
 
 _MAX_FIELDS = 200  # Fields of view that are tested if images name their stars
 _MAX_ROUNDS = 10
@@ -88,27 +97,86 @@ def calibrate_night(night: Night, threads: int | None = None) -> CalibratedNight
 
 
 def _located(night: Night, fields: tuple[float, float]) -> Night:
-    """Return the night with attitudes and field of view located on the whole sky."""
-    unknown = [index for index, exposure in enumerate(night.exposures) if exposure.stars is None]
-    found = locate([night.exposures[index] for index in unknown], night, fields) if unknown else []
-    reasons = {index: place.reason for index, place in zip(unknown, found, strict=True) if place.reason}
-    seen = [place.field for place in found if place.reason is None] or _field_of_stars(night, fields)
+    """Return the night with attitudes and field of view located on the whole sky by `tetra3rs`.
+
+    The package (extra `stars`) finds patterns of four bright images in a database of Gaia and Hipparcos,
+    without any attitude (S. Michael, https://tetra3rs.dev). Its results are initial values of the
+    identification. Stars, odds and adjustment are then the same as for given attitudes. The package supports
+    only central perspectives, that is, lenses without much distortion within some 60 degrees.
+    """
+    exposures, seen, reasons = list(night.exposures), list[float](), dict[int, Phrase]()
+    unknown = [index for index, exposure in enumerate(exposures) if exposure.stars is None]
+    if unknown:
+        low, high = (math.degrees(field) for field in fields)
+        if not 0.5 <= low <= high <= 100:
+            raise InputError(phrase("stars.blind-fields", low=low, high=high))
+        count = max(1, math.ceil(math.log(high / low) / math.log(_STEP)))
+        tried = [low * (high / low) ** ((k + 0.5) / count) for k in range(count)]
+    for index in unknown:
+        attitude, field, reason = _solved(_database(low, high), exposures[index], night, tried)
+        exposures[index] = replace(exposures[index], attitude=attitude)
+        if reason is None:
+            seen.append(field)
+            # All exposures have one camera: its field of view is tested first.
+            tried.sort(key=lambda other: abs(math.log(math.radians(other) / seen[-1])))
+        else:
+            reasons[index] = reason
+    seen = seen or _field_of_stars(night, fields)
     if not seen:
         several = {reason.code: reason for reason in reasons.values()}
         one_named = phrase("stars.one-named")
         raise InputError(phrase("stars.not-located", reasons=[*several.values()] or [one_named]))
-    exposures = list(night.exposures)
-    for index, place in zip(unknown, found, strict=True):
-        exposures[index] = replace(exposures[index], attitude=place.attitude)
     return replace(
         night,
         exposures=exposures,
         camera=SkyCamera.of_field(*night.frame, float(np.median(seen))),
-        attitude_error=ATTITUDE_ERROR,
-        field_error=FIELD_ERROR,
+        attitude_error=_ATTITUDE_ERROR,
+        field_error=_FIELD_ERROR,
         roll_known=True,
         nowhere={**night.nowhere, **reasons},
     )
+
+
+@lru_cache(maxsize=2)
+def _database(low: float, high: float) -> Any:
+    import tetra3rs
+
+    faint, bright = math.log(5.0), math.log(40.0)
+    share = min(1.0, max(0.0, (bright - math.log(low)) / (bright - faint)))
+    magnitude = _MAGNITUDES[0] + share * (_MAGNITUDES[1] - _MAGNITUDES[0])
+    return tetra3rs.SolverDatabase.generate_from_gaia(
+        None, max_fov_deg=high * math.sqrt(_STEP), min_fov_deg=low, star_max_magnitude=magnitude
+    )
+
+
+def _solved(
+    base: Any, exposure: Exposure, night: Night, fields: Sequence[float]
+) -> tuple[Floats, float, Phrase | None]:
+    """Return the attitude of an exposure and its field of view (radians), or the reason of the failure.
+
+    The images are sorted by brightness; the given attitude is not used.
+    """
+    width, height = night.frame
+    xy = exposure.xy[:_MAX_IMAGES] - 0.5 * np.array(night.frame)
+    # The weights decrease in the order of brightness.
+    images = np.column_stack([xy, np.arange(len(xy), 0, -1.0)])
+    reason = phrase("stars.nowhere")
+    for field in fields:
+        solved = base.solve_from_centroids(
+            images,
+            fov_estimate_deg=field,
+            fov_max_error_deg=field * (math.sqrt(_STEP) - 1),
+            image_width=round(width),
+            image_height=round(height),
+            solve_timeout_ms=_TIMEOUT_MS,
+        )
+        if solved and not solved.parity_flip:
+            matrix = np.asarray(solved.rotation_matrix_icrs_to_camera, float)
+            attitude = station_attitude(matrix, night.site, exposure.utc, night.earth)
+            return attitude, math.radians(solved.fov_deg), None
+        if solved:
+            reason = phrase("stars.mirrored")
+    return np.full(3, math.nan), math.nan, reason
 
 
 def _field_of_stars(night: Night, fields: tuple[float, float]) -> list[float]:

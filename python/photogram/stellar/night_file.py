@@ -24,10 +24,10 @@ from photogram.stellar.matching import STRETCH
 from photogram.stellar.night_result import Night
 from photogram.stellar.parameters import GRAD
 from photogram.stellar.places import Earth, attitude_of, axis_of, epoch, pointing_matrix, station_attitude
+from photogram.stellar.plain import effects, pole_arcsec, site
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure
 from photogram.stellar.sky_cameras import LENSES, SkyCamera, read_yaml
-from photogram.stellar.tomlfile import effects, pole_arcsec, site
 from photogram.words import phrase
 
 AUTO = "auto"  # Lens name for an automatic choice

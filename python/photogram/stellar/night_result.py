@@ -74,7 +74,7 @@ class Night(Brief):
         Largest relative error of the principal distance of `camera`.
     blind
         Smallest and largest horizontal field of view, radians, if neither attitudes nor the field of view are
-        known (`photogram.stellar.blind`); otherwise None.
+        known (`photogram.stellar.night_calibration`); otherwise None.
     tripod
         Whether the camera was fixed on a tripod: equality of its attitudes is tested.
     confirmed

@@ -12,13 +12,37 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.comparison import LEVEL, NOTABLE, fewer_stars, held_out
-from photogram.stellar.identification import STARS_OF_AN_ATTITUDE, attitude_radius, identify, identify_again
-from photogram.stellar.matching import ACCEPTED, CERTAIN, DOUBTFUL, LOG_ODDS, STRETCH, Match
+from photogram.stellar.identification import (
+    STARS_OF_AN_ATTITUDE,
+    attitude_radius,
+    identify,
+    sky_share,
+    stars_near,
+)
+from photogram.stellar.matching import (
+    ACCEPTED,
+    CERTAIN,
+    DOUBTFUL,
+    LOG_ODDS,
+    STRETCH,
+    Match,
+    expected_false,
+    log_odds,
+    star_probabilities,
+)
 from photogram.stellar.night_result import Night
-from photogram.stellar.places import attitude_of, axis_of, roll_of, turn_between
+from photogram.stellar.places import (
+    apparent_places,
+    attitude_of,
+    axis_of,
+    roll_of,
+    sidereal_time,
+    turn_between,
+)
 from photogram.stellar.sky import Site
-from photogram.stellar.sky_calibration import Exposure, SkyCalibration, calibrate_exposures
+from photogram.stellar.sky_calibration import Exposure, SkyCalibration, calibrate_exposures, project_sky
 from photogram.stellar.sky_cameras import SkyCamera
 from photogram.words import Phrase, phrase
 
@@ -91,20 +115,16 @@ class Run:
     def _sight(self, index: int, camera: SkyCamera, tolerance: float, stretch: float) -> None:
         """Identify an exposure; use it if it is significant or confirmed by the user."""
         night, tried = self.night, self.tried.get(index, 0.0)
-        sighting = identify(
+        match, stars, attitude = identify(
             night.exposures[index], night, camera, tolerance=tolerance, stretch=stretch, tried=tried
         )
-        match = sighting.match
         self.tried[index] = match.hypotheses
         self.doubtful.pop(index, None)
-        if match.accepted or (sighting.doubtful and night.names[index] in night.confirmed):
-            kept, scale = sighting.stars >= 0, match.scale
-            self._take(
-                Seen(index, sighting.stars, kept, sighting.attitude, first=match.expected, scale=scale)
-            )
+        if match.accepted or (match.doubtful and night.names[index] in night.confirmed):
+            self._take(Seen(index, stars, stars >= 0, attitude, match.expected, scale=match.scale))
             return
-        self.rejected[index] = sighting.reason()
-        if sighting.doubtful:
+        self.rejected[index] = match.reason()
+        if match.doubtful:
             self.doubtful[index] = match.expected
 
     def _unidentified(self) -> list[int]:
@@ -259,26 +279,50 @@ def _noise(night: Night, found: SkyCalibration) -> float:
 
 
 def _seen_again(night: Night, seen: Seen, found: SkyCalibration, attitude: Floats) -> Seen:
-    exposure, noise = night.exposures[seen.index], _noise(night, found)
+    """Find the nearest star of each image with the calibrated camera; named stars are unchanged."""
+    exposure, noise = replace(night.exposures[seen.index], attitude=attitude), _noise(night, found)
+    frame, site, named = night.frame, night.site, exposure.stars
     limit = night.rejection * noise if night.rejection else math.inf
     reach = max(2 * night.rejection * noise, _REACH)
-    again = identify_again(replace(exposure, attitude=attitude), night, found.camera, reach)
-    probabilities = again.probabilities(noise)
+    near = stars_near(exposure, found.camera, site, night, 0.0)
+    if named is not None:
+        near = np.union1d(near, named[named >= 0])
+    places = apparent_places(night.catalogue.take(near), exposure.utc, site.effects)
+    time = sidereal_time(site, exposure.utc, night.earth.dut1)
+    predicted = project_sky(found.camera, attitude, site, places, time)
     with np.errstate(invalid="ignore"):
-        kept = again.off <= limit
+        rows = np.flatnonzero(((predicted > -reach) & (predicted < np.array(frame) + reach)).all(axis=1))
+        inside = int(((predicted >= 0) & (predicted <= frame)).all(axis=1).sum())
+    density = inside / (frame[0] * frame[1] * sky_share(found.camera, attitude, frame))
+    if named is None:
+        nearest = mutually_nearest(exposure.xy, predicted[rows], reach)
+        local = np.where(nearest >= 0, rows[nearest], -1) if len(rows) else nearest
+        stars = np.where(local >= 0, near[local], -1)
+        probabilities = star_probabilities(exposure.xy, predicted[rows], nearest, noise, density)
+    else:
+        stars, probabilities = named, np.full(len(named), np.nan)
+        local = np.where(named >= 0, np.searchsorted(near, named), -1)
+    has = local >= 0
+    away = exposure.xy[has] - predicted[local[has]]
+    off = np.full(len(local), np.nan)
+    off[has] = np.abs(away).max(axis=1)
+    with np.errstate(invalid="ignore"):
+        kept = off <= limit
         if night.rejection:
             kept &= ~(probabilities < CERTAIN)
     if kept.sum() < STARS_OF_AN_ATTITUDE:
         return replace(seen, odds=math.inf)
-    odds = log_odds = math.nan
-    if exposure.stars is None:
-        radius, log_odds = attitude_radius(night), again.log_odds(noise)
-        # A whole rotation moves the corners along their circle.
-        roll = radius if night.roll_known else 0.5 * math.pi * math.hypot(*night.frame)
-        odds = again.expected(limit if night.rejection else _REACH, radius, roll)
-    return replace(
-        seen, stars=again.stars, kept=kept, odds=odds, log_odds=log_odds, probabilities=probabilities
-    )
+    odds = of_exposure = math.nan
+    if named is None:
+        of_exposure = log_odds(np.linalg.norm(away, axis=1), len(stars), noise, density)
+        # Attitudes are counted in steps of the limit. They cover the errors of the approximate attitude and,
+        # at the corners, of its roll: a whole rotation moves the corners along their circle.
+        step, radius = limit if night.rejection else _REACH, attitude_radius(night)
+        roll = radius if night.roll_known else 0.5 * math.pi * math.hypot(*frame)
+        attitudes = (1 + 2 * radius / step) ** 2 * (1 + 2 * roll / step)
+        matched = int((off <= step).sum())
+        odds = expected_false(len(stars), 2, density * (2 * step) ** 2, matched, attitudes)
+    return replace(seen, stars=stars, kept=kept, odds=odds, log_odds=of_exposure, probabilities=probabilities)
 
 
 _MAX_EXPOSURES = 3
@@ -313,7 +357,7 @@ class _Mistake:
         camera = replace(night.camera, values=values)
         night = replace(night, camera=camera, site=replace(night.site, **self.site))
         stretch = max(STRETCH if self.scale == 1.0 else _WIDE, night.field_error)
-        matched = identify(exposure, night, camera, tolerance=night.tolerance, stretch=stretch).match
+        matched, *_ = identify(exposure, night, camera, tolerance=night.tolerance, stretch=stretch)
         return matched, float(values[0]) / matched.scale
 
 

@@ -17,17 +17,74 @@ from photogram.io.angles import ARCSEC
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_records
 from photogram.io.places import Place, at_place
-from photogram.io.toml import TomlTree, read_document
+from photogram.io.toml import TomlTree, read_document, read_toml
 from photogram.lazy_dataclasses import fields
 from photogram.stellar.cameras import PlateCamera
 from photogram.stellar.catalogue import star_key
-from photogram.stellar.options import Options
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS
 from photogram.stellar.places import sidereal_time
-from photogram.stellar.problem import Axis, Problem, default_parameters, rejected
-from photogram.stellar.sky import HOUR, Site, landmark
-from photogram.stellar.tomlfile import effects, pole_arcsec, site
+from photogram.stellar.problem import Axis, Options, Problem, default_parameters, rejected
+from photogram.stellar.sky import ABERRATION, HECTOPASCAL, HOUR, Air, Effects, Site, landmark
 from photogram.words import phrase
+
+_STATION = {
+    "latitude_deg",
+    "longitude_east_deg",
+    "longitude_west_deg",
+    "elevation_m",
+    "temperature_K",
+    "pressure_hPa",
+    "pressure_mmHg",
+    "aberration_arcsec",
+    "number",
+    "name",
+}
+
+
+def inputs(path: Path) -> list[Path]:
+    """Return a file of a plate or night, and the files that it names: results must not replace them."""
+    tables = [table for _, table in read_toml(path).items() if isinstance(table.value, dict)]
+    keys = ("file", "prior", "start")
+    return [path, *(table[key].named_file() for table in tables for key in keys if key in table)]
+
+
+def effects(table: TomlTree) -> Effects:
+    """Return the effects on apparent positions, except for disabled ones."""
+    return Effects(**{one.name: table.get(one.name, True).switch() for one in fields(Effects)})
+
+
+def site(table: TomlTree) -> Site:
+    """Return the station of a table."""
+    table.only(_STATION)
+    latitude = table["latitude_deg"].number(-90, 90)
+    temperature = table.get("temperature_K", 273.15).number()
+    if table.says("pressure_hPa", "pressure_mmHg"):
+        pressure = table["pressure_hPa"].number() / HECTOPASCAL
+    else:
+        pressure = table.get("pressure_mmHg", 760.0).number()
+    if table.says("longitude_east_deg", "longitude_west_deg"):
+        west = -table["longitude_east_deg"].number(-360, 360)
+    else:
+        west = table.get("longitude_west_deg", 0.0).number(-360, 360)
+    with at_place(table):
+        air = Air(temperature, pressure)
+    return Site(
+        latitude=math.radians(latitude),
+        longitude_west=math.radians(west),
+        elevation=table.get("elevation_m", 0.0).number(-500, 100_000),
+        air=air,
+        aberration=table["aberration_arcsec"].number(0, 1) * ARCSEC
+        if "aberration_arcsec" in table
+        else ABERRATION,
+        number=table.get("number", "").word(),
+        name=table.get("name", "").word(),
+    )
+
+
+def pole_arcsec(table: TomlTree, key: str) -> float:
+    """Return a coordinate of the pole; zero if it is missing."""
+    return table.get(key, 0.0).number(-2, 2)
+
 
 _READERS: dict[type, Callable[[TomlTree], Any]] = {
     bool: TomlTree.switch,

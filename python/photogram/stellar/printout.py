@@ -19,7 +19,7 @@ from photogram.stellar.sky import Site
 
 if TYPE_CHECKING:
     from photogram.stellar import Result
-    from photogram.stellar.state import Solved
+    from photogram.stellar.iteration import Solved
 
 WIDTH = 132
 

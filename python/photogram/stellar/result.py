@@ -17,11 +17,11 @@ from photogram.show.methods import Documented, Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.camera_tables import correlated, correlation_remarks, correlations, significance
 from photogram.stellar.cameras import PlateCamera
-from photogram.stellar.directions import Directions, directions, mean_error_ellipses
+from photogram.stellar.curves import Directions, directions, mean_error_ellipses
+from photogram.stellar.iteration import PreRun, Solved
 from photogram.stellar.parameters import DISTORTION, GROUPS, INDEX, NAMES, SIGNIFICANT
 from photogram.stellar.places import transformed_angles
 from photogram.stellar.problem import Counts, Problem
-from photogram.stellar.state import PreRun, Solved
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:

@@ -21,10 +21,9 @@ from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import available_memory
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.options import core_threads
 from photogram.stellar.parameters import COMMON
 from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time, transformed_angles
-from photogram.stellar.problem import NO_PRIOR, Prior, core_problem
+from photogram.stellar.problem import NO_PRIOR, Prior, core_problem, core_threads
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_cameras import SkyCamera, weight_of
 from photogram.words import Phrase, phrase

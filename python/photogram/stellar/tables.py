@@ -29,11 +29,11 @@ from photogram.stellar.camera_tables import (
 from photogram.stellar.curves import (
     distortion_curves,
     histogram,
+    mean_error_ellipses,
     refraction_curves,
     residual_classes,
     star_means,
 )
-from photogram.stellar.directions import mean_error_ellipses
 from photogram.stellar.movement import DIAGONAL
 from photogram.stellar.parameters import GRAD, GROUPS, NAMES, UNITS
 from photogram.stellar.problem import Counts
