@@ -22,7 +22,7 @@ from photogram.collection import adjust as adjust_collection
 from photogram.collection import simulate as simulate_collection
 from photogram.results.components import statement
 from photogram.results.grouping import Probing
-from photogram.statistics.components import GroupsOf, balanced, estimate, helmert_step
+from photogram.statistics.components import GroupsOf, Settings, balanced, estimate, helmert_step
 
 PUBLISHED = Path(__file__).parent / "data" / "statistics" / "published_problems.json"
 EXACT = Probing(exact=10_000)
@@ -67,9 +67,8 @@ def one_way():
 
 def estimated(values, start, **options):
     groups = GroupsOf(("batch", "residual"))
-    return estimate(
-        lambda factors: OneWay(values, start * factors), groups, tolerance=1e-9, least_redundancy=1, **options
-    )
+    settings = Settings(tolerance=1e-9, least_redundancy=1, **options)
+    return estimate(lambda factors: OneWay(values, start * factors), groups, settings)
 
 
 def test_dyestuff(one_way):

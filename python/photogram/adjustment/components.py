@@ -13,13 +13,13 @@ from photogram.arguments.arrays import probability, truth_value
 from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block
 from photogram.network.observations.observation import Observation
 from photogram.results.components import VarianceComponents
 from photogram.results.grouping import Grouping, GroupsArgument, Left, Probing, grouped, observables
 from photogram.results.network import AdjustedNetwork
-from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, estimate
+from photogram.statistics.components import LEAST_REDUNDANCY, Estimate, Settings, estimate
 from photogram.words import phrase
 
 NOTHING = 1e-6  # Redundancy below this value is rounding
@@ -44,12 +44,12 @@ class Weighing:
         self.network: Any = self.given
         self.threads = threads
 
-    def adjust(self, grouping: Grouping, factors: Floats) -> AdjustedNetwork:
-        """Adjust with the variances of (G,) groups multiplied by factors."""
-        self.network = scaled(self.given, grouping, factors)
-        again = adjusted_again if isinstance(self.network, Block) else type(self.network)._adjust_again
+    def adjust(self, network: Any) -> AdjustedNetwork:
+        """Adjust the network with other weights."""
+        self.network = network
+        again = adjusted_again if isinstance(network, Block) else type(network)._adjust_again
         options, state = self.result.options, self.result.state
-        self.result = again(self.network, options, start=state, threads=self.threads)
+        self.result = again(network, options, start=state, threads=self.threads)
         return self.result
 
 
@@ -117,7 +117,7 @@ def variance_components(
     held
         Groups with fixed variances.
     tolerance, max_steps, least_redundancy, level, equality
-        As in `photogram.statistics.components.estimate`.
+        As in `photogram.statistics.components.Settings`.
     probing
         Computation of the Helmert matrix: seed and number of random vectors.
     threads
@@ -141,20 +141,9 @@ def variance_components(
     probability("tolerance", tolerance)
     at_least("max_steps", max_steps, 1)
     grouping = grouped(observables(network), groups)
-    settings = Settings(tolerance, max_steps, least_redundancy, level, equality, probing or Probing())
-    return of_grouping(network, grouping, settings, held=held, threads=threads, progress=progress)
-
-
-@dataclass(frozen=True)
-class Settings:
-    """Options of the estimation; see :func:`variance_components`."""
-
-    tolerance: float = 1e-4
-    max_steps: int = 100
-    least_redundancy: float = LEAST_REDUNDANCY
-    level: float = 0.05
-    equality: bool = True
-    probing: Probing = field(default_factory=Probing)
+    settings = Settings(tolerance, max_steps, least_redundancy, level, equality)
+    given: dict[str, Any] = {"held": held, "probing": probing, "threads": threads}
+    return of_grouping(network, grouping, settings, **given, progress=progress)
 
 
 def of_grouping(
@@ -163,6 +152,7 @@ def of_grouping(
     settings: Settings,
     *,
     held: Sequence[str] = (),
+    probing: Probing | None = None,
     threads: int | None = None,
     progress: Callable[[int, Floats], None] | None = None,
 ) -> VarianceComponents:
@@ -175,13 +165,13 @@ def of_grouping(
 
     def adjusted(factors: Floats) -> Left:
         nonlocal number
-        result = own.adjust(grouping, factors[:-1]) if number else own.first
+        result = own.adjust(scaled(own.given, grouping, factors[:-1])) if number else own.first
         if not np.isfinite(result.redundancy[result.used_images]).all():
             raise InputError(phrase("weighting.undetermined"))
         if progress is not None:
             progress(number, factors[:-1].copy())
         number += 1
-        return Left(result, grouping, settings.probing)
+        return Left(result, grouping, probing or Probing())
 
     found = estimate(
         adjusted,
@@ -192,15 +182,11 @@ def of_grouping(
             images=(*grouping.groups.images, False),
             held={names.index(name): "as asked" for name in held} | {len(names): "its weights are given"},
         ),
-        tolerance=settings.tolerance,
-        max_steps=settings.max_steps,
-        least_redundancy=settings.least_redundancy,
-        level=settings.level,
-        equality=settings.equality,
+        settings,
     )
     if not any(each.redundancy > 0 for each in found.components):
         raise InputError(phrase("weighting.no-redundancy"))
-    last = own.adjust(grouping, found.factors[:-1])
+    last = own.adjust(scaled(own.given, grouping, found.factors[:-1]))
     return VarianceComponents(_without_nothing(found), own.network, last, own.first)
 
 

@@ -15,9 +15,8 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.network.motion import focal_images
 from photogram.results.components import Bin, VarianceFunction
-from photogram.results.grouping import Grouping, Probing, group_sums, observables
+from photogram.results.grouping import Probing, group_sums, observables
 from photogram.results.network import AdjustedNetwork
-from photogram.statistics.components import GroupsOf
 from photogram.statistics.variance_function import estimate_function
 from photogram.words import phrase
 
@@ -93,8 +92,7 @@ def variance_function(
     probing = probing or Probing()
     at_least("bins", bins, 2)
     at_least("max_steps", max_steps, 1)
-    seen = observables(network)
-    images = len(seen.given.image_photos)
+    images = len(observables(network).given.image_photos)
     own = Weighing(network, threads=threads, tolerance=TOLERANCE)
     values = _values(own, of, center, images)
     used = own.first.used_images
@@ -103,21 +101,12 @@ def variance_function(
         raise InputError(phrase("weighting.no-function"))
     share = np.repeat((values / largest) ** 2, 2)
     terms = np.stack([np.ones(2 * images), share], axis=1)
-    # One group per image coordinate, and no others.
-    grouping = Grouping(
-        groups=GroupsOf(("",) * (2 * images)),
-        images=np.arange(2 * images).reshape(-1, 2),
-        points=np.full(seen.point_observed.shape, -1),
-        photos=np.full(seen.photo_observed.shape, -1),
-        observations=np.full(len(seen.given.observations), -1),
-    )
-    first = True
 
     def adjusted(factors: Floats) -> _Left:
-        nonlocal first
-        result = own.first if first else own.adjust(grouping, factors)
-        first = False
-        return _Left(result, probing)
+        if (factors == 1).all():
+            return _Left(own.first, probing)
+        roots = np.sqrt(factors).reshape(-1, 2)
+        return _Left(own.adjust(own.given.replace(image_sd=own.given.image_sd * roots)), probing)
 
     found = estimate_function(adjusted, terms, max_steps=max_steps)
     shown_bins = _bins(own.result, values, found.factors.reshape(-1, 2)[:, 0], bins, probing)

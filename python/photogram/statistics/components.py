@@ -43,17 +43,9 @@ NODES = 4  # Nodes of the integral of the likelihood ratio
 class Weighted(Protocol):
     """Result of an adjustment for G groups with given components."""
 
-    @property
-    def counts(self) -> Indices:
-        """(G,) observations."""
-
-    @property
-    def squares(self) -> Floats:
-        """(G,) weighted sums of squares, weights divided by the components."""
-
-    @property
-    def redundancy(self) -> Floats:
-        """(G,) sums of redundancy numbers."""
+    counts: Indices  # (G,) observations
+    squares: Floats  # (G,) weighted sums of squares, weights divided by the components
+    redundancy: Floats  # (G,) sums of redundancy numbers
 
     def matrix(self) -> Floats:
         """Return the (G, G) Helmert matrix."""
@@ -169,24 +161,12 @@ def balanced(matrix: Floats, redundancy: Floats, exact: Sequence[bool]) -> Float
     return np.asarray(found)
 
 
-def estimate(
-    adjust: Callable[[Floats], Weighted],
-    groups: GroupsOf,
-    *,
-    tolerance: float = 1e-4,
-    max_steps: int = 100,
-    least_redundancy: float = LEAST_REDUNDANCY,
-    level: float = 0.05,
-    equality: bool = True,
-) -> Estimate:
-    """Estimate variance components.
+@dataclass(frozen=True)
+class Settings:
+    """Options of :func:`estimate`.
 
-    Parameters
+    Attributes
     ----------
-    adjust
-        Function that adjusts with (G,) components; called first with ones.
-    groups
-        The groups.
     tolerance
         Relative tolerance. The iteration stops if no component changes by more than it, or by more than a
         hundredth of its standard deviation (and a hundred times the tolerance). A last Helmert step must then
@@ -200,67 +180,78 @@ def estimate(
     equality
         True to test that all are equal, with some additional adjustments.
     """
-    run = _Run(adjust, groups, tolerance, max_steps)
-    run.judge(least_redundancy)
+
+    tolerance: float = 1e-4
+    max_steps: int = 100
+    least_redundancy: float = LEAST_REDUNDANCY
+    level: float = 0.05
+    equality: bool = True
+
+
+def estimate(
+    adjust: Callable[[Floats], Weighted], groups: GroupsOf, settings: Settings | None = None
+) -> Estimate:
+    """Estimate variance components.
+
+    Parameters
+    ----------
+    adjust
+        Function that adjusts with (G,) components; called first with ones.
+    groups
+        The groups.
+    settings
+        The options; None: the defaults.
+    """
+    run = _Run(adjust, groups, settings or Settings())
     while not run.iterate():
         pass
-    ratio = run.equality() if equality else None
-    return run.finished(level, ratio)
+    return run.finished()
 
 
 class _Run:
     """The iteration, with groups joined into units that have one component each."""
 
-    def __init__(
-        self, adjust: Callable[[Floats], Weighted], groups: GroupsOf, tolerance: float, max_steps: int
-    ) -> None:
-        self.adjust, self.groups = adjust, groups
-        self.tolerance, self.max_steps = tolerance, max_steps
-        self.units: list[tuple[str, list[int]]] = [(name, [g]) for g, name in enumerate(groups.names)]
-        self.held: dict[int, Phrase | str] = dict(groups.held)
+    def __init__(self, adjust: Callable[[Floats], Weighted], groups: GroupsOf, settings: Settings) -> None:
+        self.adjust, self.groups, self.settings = adjust, groups, settings
         self.messages: list[Phrase] = []
         self.factors = np.ones(len(groups.names))
         self.state = adjust(self.factors)
         self.steps: list[tuple[Floats, Floats, Floats]] = []
         self.matrix: Floats = np.zeros((0, 0))
         self.converged = False
-        self.least = LEAST_REDUNDANCY
+        self.units: list[tuple[str, list[int]]] = []
+        self.held: dict[int, Phrase | str] = {}
+        self._judge()
 
-    def judge(self, least: float) -> None:
+    def _judge(self) -> None:
         """Merge groups that cannot be estimated, and fix the remaining weak components."""
-        self.least = least
         parents = self.groups.parents or ("",) * len(self.groups.names)
         pools: dict[int, tuple[str, list[int]]] = {}
         for parent in dict.fromkeys(filter(None, parents)):
-            siblings = [g for g, own in enumerate(parents) if own == parent and g not in self.held]
-            if pool := self._pool(siblings, least):
+            siblings = [g for g, own in enumerate(parents) if own == parent and g not in self.groups.held]
+            if pool := self._pool(siblings):
                 names = [self.groups.names[g] for g in pool]
                 name = parent if len(pool) == len(siblings) or "other" in parent else f"others of {parent}"
                 self.messages.append(Phrase("components.merged", {"names": names, "name": name}))
                 pools |= dict.fromkeys(pool, (name, pool))
-        units: list[tuple[str, list[int]]] = []
-        held: dict[int, Phrase | str] = {}
         for g, own_name in enumerate(self.groups.names):
             name, members = pools.get(g, (own_name, [g]))
-            if members[0] != g:
-                continue
-            if g in self.held:
-                held[len(units)] = self.held[g]
-            elif why := self._why(members, least):
-                held[len(units)] = why
-            units.append((name, members))
-        self.units, self.held = units, held
+            if members[0] == g:
+                if why := self.groups.held.get(g) or self._why(members):
+                    self.held[len(self.units)] = why
+                self.units.append((name, members))
 
-    def _pool(self, siblings: list[int], least: float) -> list[int]:
+    def _pool(self, siblings: list[int]) -> list[int]:
         """Return the weak groups and the others that they need; empty without any."""
-        pool = [g for g in siblings if self._why([g], least)]
+        pool = [g for g in siblings if self._why([g])]
         others = sorted(set(siblings) - set(pool), key=lambda g: float(self.state.redundancy[g]))
-        while pool and others and self._why(pool, least):
+        while pool and others and self._why(pool):
             pool.append(others.pop(0))
         return sorted(pool) if len(pool) > 1 else []
 
-    def _why(self, members: list[int], least: float) -> Phrase | None:
+    def _why(self, members: list[int]) -> Phrase | None:
         """Return the reason for not estimating a joint component of groups, or None."""
+        least = self.settings.least_redundancy
         r, n = float(self.state.redundancy[members].sum()), int(self.state.counts[members].sum())
         if r < min(REFUSED, least):
             return Phrase("held.unchecked", {"redundancy": r})
@@ -285,14 +276,9 @@ class _Run:
         ).reshape(len(self.units), len(self.units))
         return matrix, helmert_step(matrix, self._sums(self.state.squares), self.free)
 
-    def _step(self, factors: Floats) -> None:
-        """Multiply the components of the free units, and adjust."""
-        for unit, factor in zip(self.free, factors, strict=True):
-            self.factors[self.units[unit][1]] *= factor
-        self.state = self.adjust(self.factors)
-
     def iterate(self) -> bool:
         """Iterate until nothing changes; return False if a component had to be fixed."""
+        tolerance = self.settings.tolerance
         while True:
             free = self.free
             squares, redundancy = self._sums(self.state.squares), self._sums(self.state.redundancy)
@@ -302,26 +288,30 @@ class _Run:
                 self.converged = True
                 return True
             factors = squares[free] / redundancy[free]
-            of_sd = np.minimum(0.01 * np.sqrt(2 / redundancy[free]), 100 * self.tolerance)
-            limit = np.maximum(self.tolerance, of_sd)
+            of_sd = np.minimum(0.01 * np.sqrt(2 / redundancy[free]), 100 * tolerance)
+            limit = np.maximum(tolerance, of_sd)
             still = bool((np.abs(factors - 1) < limit).all())
             if still or len(self.steps) % BY_HELMERT == 0:
                 self.matrix, by_helmert = self._helmert()
                 moved = np.abs(by_helmert - 1)
-                if still and (moved <= 100 * self.tolerance).all():
+                if still and (moved <= 100 * tolerance).all():
                     if (unit := self._inseparable()) is not None:
+                        # Restore the given variance.
                         self.held[unit] = Phrase("held.inseparable")
-                        self._back(unit)
+                        self.factors[self.units[unit][1]] = 1.0
+                        self.state = self.adjust(self.factors)
                         return False
                     self.converged = True
                     return True
                 if (by_helmert > 1 / LIMIT_OF_STEP).all() and (by_helmert < LIMIT_OF_STEP).all():
                     factors = by_helmert
-            if len(self.steps) >= self.max_steps:
+            if len(self.steps) >= self.settings.max_steps:
                 self.matrix, _ = self._helmert()
-                self.messages.append(Phrase("components.not-converged", {"n": self.max_steps}))
+                self.messages.append(Phrase("components.not-converged", {"n": self.settings.max_steps}))
                 return True
-            self._step(np.clip(factors, 1 / LIMIT_OF_STEP, LIMIT_OF_STEP))
+            for unit, factor in zip(free, np.clip(factors, 1 / LIMIT_OF_STEP, LIMIT_OF_STEP), strict=True):
+                self.factors[self.units[unit][1]] *= factor
+            self.state = self.adjust(self.factors)
             if self._vanished():
                 return False
 
@@ -345,7 +335,7 @@ class _Run:
         self.state = self.adjust(self.factors)
         for unit in low:
             members = self.units[unit][1]
-            if (why := self._why(members, self.least)) is None:
+            if (why := self._why(members)) is None:
                 self.messages.append(said[unit])
                 why = Phrase("held.bound", {"bound": LOWER_BOUND})
                 self.factors[members] = LOWER_BOUND
@@ -365,19 +355,14 @@ class _Run:
         rows: list[int] = concerned.tolist()
         return min((free[k] for k in rows), key=lambda unit: float(self.matrix[unit].sum()))
 
-    def _back(self, unit: int) -> None:
-        """Restore the given variance of a unit."""
-        self.factors[self.units[unit][1]] = 1.0
-        self.state = self.adjust(self.factors)
-
-    def equality(self) -> tuple[float, int, float] | None:
+    def _equality(self) -> tuple[float, int, float] | None:
         """Test whether all free components are equal.
 
         The derivative of the restricted log likelihood by ln(theta_g) is (q_g - r_g) / 2. Twice its
         difference between equal and estimated components is the integral of q_g - r_g along the line.
         """
         free = self.free
-        if len(free) < 2 or not self.converged:
+        if len(free) < 2 or not (self.converged and self.settings.equality):
             return None
         members = [g for unit in free for g in self.units[unit][1]]
         end, present = np.log(self.factors[members]), self.factors.copy()
@@ -396,16 +381,16 @@ class _Run:
         """Return the logarithm of the joint component of some groups."""
         factors = factors.copy()
         factors[members] = 1.0
-        for _ in range(self.max_steps):
+        for _ in range(self.settings.max_steps):
             state = self.adjust(factors)
             step = float(state.squares[members].sum() / state.redundancy[members].sum())
             factors[members] *= np.clip(step, 1 / LIMIT_OF_STEP, LIMIT_OF_STEP)
-            if abs(step - 1) < self.tolerance:
+            if abs(step - 1) < self.settings.tolerance:
                 break
         return math.log(factors[members[0]])
 
-    def finished(self, level: float, equality: tuple[float, int, float] | None) -> Estimate:
-        free = self.free
+    def finished(self) -> Estimate:
+        equality, free, level = self._equality(), self.free, self.settings.level
         deviations = np.full(len(self.units), np.nan)
         if free:
             inverse = np.linalg.inv(self.matrix[np.ix_(free, free)])

@@ -30,13 +30,8 @@ CLOSE = 0.01  # Largest change of a coefficient in the last step, in standard de
 class Residuals(Protocol):
     """Result of an adjustment for k observations with given variances."""
 
-    @property
-    def squares(self) -> Floats:
-        """(k,) squares of residuals in standard deviations."""
-
-    @property
-    def redundancy(self) -> Floats:
-        """(k,) redundancy numbers."""
+    squares: Floats  # (k,) squares of residuals in standard deviations
+    redundancy: Floats  # (k,) redundancy numbers
 
     def information(self, terms: Floats) -> Floats:
         """Return (t, t) sums of R_ij^2 c_i c_j^T over the (k, t) nonnegative terms c."""
@@ -77,15 +72,16 @@ def estimate_function(
     factors = np.ones(len(terms))
     state = adjust(factors)
     beta: Floats = np.zeros(terms.shape[1])
-    first: Floats | None = None
-    for step in range(1, max_steps + 1):
+    first, converged, step = beta, False, 0
+    while not converged and step < max_steps:
+        step += 1
         r = state.redundancy
         used = np.isfinite(state.squares) & (r > LEAST)
         c = terms[used] / factors[used, np.newaxis]
         normal = (c * r[used, np.newaxis]).T @ c
         scale = 1.0 / np.sqrt(np.diag(normal))
         found = scale * nonnegative(normal * np.outer(scale, scale), scale * (c.T @ state.squares[used]))
-        first = found if first is None else first
+        first = first if step > 1 else found
         # Corresponds to R_ij^2 on the diagonal only: the steps end below the actual standard deviation.
         deviations = np.sqrt(2.0) * scale
         moved = np.abs(found - beta)
@@ -93,24 +89,7 @@ def estimate_function(
         if not (factors > 0).all():
             factors = np.maximum(factors, 1e-4 * float(factors.max()))
         state = adjust(factors)
-        if (moved < CLOSE * deviations).all():
-            return _finished(state, terms, beta, first, factors, step, converged=True)
-    return _finished(
-        state, terms, beta, first if first is not None else beta, factors, max_steps, converged=False
-    )
-
-
-def _finished(
-    state: Residuals,
-    terms: Floats,
-    beta: Floats,
-    first: Floats,
-    factors: Floats,
-    steps: int,
-    *,
-    converged: bool,
-) -> FunctionEstimate:
+        converged = bool((moved < CLOSE * deviations).all())
     information = state.information(terms / factors[:, np.newaxis]) / 2
     covariance: Floats = np.asarray(np.linalg.pinv(information), dtype=np.float64)
-    sd: Floats = np.asarray(np.sqrt(np.diag(covariance)))
-    return FunctionEstimate(beta, sd, covariance, first, factors, converged, steps)
+    return FunctionEstimate(beta, np.sqrt(np.diag(covariance)), covariance, first, factors, converged, step)
