@@ -44,7 +44,7 @@ def test_the_sample_is_what_its_truth_says():
 def test_what_is_written_reads_back(tmp_path):
     made = RING.collection
     again, kind = recognised(written(tmp_path, TEXT))
-    assert kind.name == "bundler"
+    assert kind.NAME == "bundler"
     np.testing.assert_array_equal(again.point_positions, made.point_positions)
     np.testing.assert_array_equal(again.photo_parameters[:, 3:], made.photo_parameters[:, 3:])
     np.testing.assert_allclose(again.photo_parameters[:, :3], made.photo_parameters[:, :3], atol=1e-15)

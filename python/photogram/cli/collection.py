@@ -50,7 +50,7 @@ def collection(
         documents = replace(documents, out=out or Path("example-adjusted"))
     packing = problem.suffix if problem.suffix in PACKED else ""
     photos, found = recognised(problem)
-    adjusted = f"adjusted{found.suffix}{packing}"
+    adjusted = f"adjusted{found.SUFFIX}{packing}"
     documents.declare(job, TEXT, adjusted, pictures=None)
     photos = photos.replace(image_sd=sd)
     if snoop:
@@ -77,10 +77,10 @@ def collection(
         name="cost",
         factor=0.5,
     )
-    files = {adjusted: to_bytes(result.result.adjusted(), packing, found.name), **result.files}
+    files = {adjusted: to_bytes(result.result.adjusted(), packing, found.NAME), **result.files}
     from photogram.show.page import Fact
 
-    file = Fact("File", str(job.shown(problem)), note=found.title)
+    file = Fact("File", str(job.shown(problem)), note=found.TITLE)
     documents.conclude(
         job,
         result.subject,

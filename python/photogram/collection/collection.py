@@ -11,11 +11,12 @@ from photogram import _photocore
 from photogram.arguments.arrays import length
 from photogram.arguments.equality import Valued
 from photogram.arguments.fields import array, check_arrays
-from photogram.arguments.types import FREE, ONE, Array, Bools, Floats, IndexArray
+from photogram.arguments.types import FREE, ONE, Array, Floats, IndexArray
 from photogram.collection.parameters import POSE, parameters_of
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import converting_dataclass, field, replace
 from photogram.network.block import span
+from photogram.network.cameras import camera_facts
 from photogram.network.knots import KNOTTED
 from photogram.network.observations import Observation, Observations
 from photogram.network.tables import numbered
@@ -76,8 +77,9 @@ class Collection(Valued, Brief):
         if self.camera not in known:
             raise InputError(phrase("collection.camera", names=known, value=self.camera))
         if np.ndim(self.photo_sd) == 0:
-            rows = length("photo_parameters", self.photo_parameters)
-            of_all = np.tile(np.where(self._constant, 0.0, self.photo_sd), (rows, 1))
+            rows, names = length("photo_parameters", self.photo_parameters), self.parameters
+            constant = np.arange(len(names)) >= len(names) - camera_facts(self.camera)[2]
+            of_all = np.tile(np.where(constant, 0.0, self.photo_sd), (rows, 1))
             object.__setattr__(self, "photo_sd", of_all)
         check_arrays(self, parameters=len(self.parameters))
 
@@ -117,18 +119,9 @@ class Collection(Valued, Brief):
         return False
 
     @property
-    def _model(self) -> tuple[str, list[tuple[str, int]], int, str, str]:
-        return dict(_photocore.camera_models())[self.camera]
-
-    @property
     def parameters(self) -> tuple[str, ...]:
         """Names of the k parameters of a photo."""
         return parameters_of(self.camera)[0]
-
-    @property
-    def _constant(self) -> Bools:
-        """(k,) which parameters of a photo are always fixed."""
-        return np.arange(len(self.parameters)) >= len(self.parameters) - self._model[2]
 
     @property
     def units(self) -> tuple[str, ...]:
@@ -138,7 +131,7 @@ class Collection(Valued, Brief):
     @property
     def formula(self) -> str:
         """Formula of the image of P, a point in the axes of the photo."""
-        return self._model[0]
+        return camera_facts(self.camera)[0]
 
     def replace(self, **changes: Any) -> Self:
         """Return the collection with some arrays replaced."""

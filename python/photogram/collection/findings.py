@@ -86,18 +86,15 @@ def _partials(result: AdjustedCollection) -> Floats:
     points = result.point_positions[collection.image_points]
     found = np.full((photos.shape[1] + POINTS, len(photos), 2), np.nan)
     seen = np.flatnonzero(result.used_images)
-    photos, points = photos[seen], points[seen]
+    values, width = np.hstack([photos[seen], points[seen]]), photos.shape[1]
+    steps = STEP * np.maximum(np.abs(values), 1.0)
+    steps[:, width:] = STEP * np.median(np.abs(points[seen]))
 
-    size = float(np.median(np.abs(points)))
-    for k in range(len(found)):
-        of_photo = k < photos.shape[1]
-        values = photos[:, k] if of_photo else np.full(len(points), size)
-        step = STEP * np.maximum(np.abs(values), 1.0 if of_photo else size)
-        ends = []
-        for sign in (1, -1):
-            moved = [photos.copy(), points.copy()]
-            column = k if of_photo else k - photos.shape[1]
-            moved[0 if of_photo else 1][:, column] += sign * step
-            ends.append(_photocore.collection_images(collection.camera, *moved))
-        found[k, seen] = (ends[0] - ends[1]) / (2 * step[:, np.newaxis])
+    def images(moved: Floats) -> Floats:
+        parts = map(np.ascontiguousarray, (moved[:, :width], moved[:, width:]))
+        return _photocore.collection_images(collection.camera, *parts)
+
+    for k, step in enumerate(steps.T):
+        moved = np.outer(step, np.arange(len(found)) == k)
+        found[k, seen] = (images(values + moved) - images(values - moved)) / (2 * step[:, np.newaxis])
     return found

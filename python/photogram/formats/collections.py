@@ -42,7 +42,7 @@ def read_bundler(path: Path, options: ReadOptions) -> Project:
 
     del options
     place = bundle_of(path)
-    found = bundler.FORMAT.read(place, pieces(place))
+    found = bundler.read(place, pieces(place))
     count = len(found.photo_parameters)
     names = [str(row) for row in range(count)]
     beside = place.parent / LIST
@@ -62,7 +62,7 @@ def write_bundler(project: Project) -> Mapping[str, bytes]:
     from photogram.collection.formats import bundler
 
     found, names = collection_of(project)
-    return {FILE: bundler.FORMAT.to_bytes(found), LIST: "".join(f"{name}\n" for name in names).encode()}
+    return {FILE: bundler.to_bytes(found), LIST: "".join(f"{name}\n" for name in names).encode()}
 
 
 def read_bal(path: Path, options: ReadOptions) -> Project:
@@ -70,7 +70,7 @@ def read_bal(path: Path, options: ReadOptions) -> Project:
     from photogram.collection.formats import bal
 
     del options
-    found = bal.FORMAT.read(path, pieces(path))
+    found = bal.read(path, pieces(path))
     return project_of(
         found, path, FORMATS["bal"].title, [str(row) for row in range(len(found.photo_parameters))]
     )
@@ -80,7 +80,7 @@ def write_bal(project: Project) -> Mapping[str, bytes]:
     """Return the problem."""
     from photogram.collection.formats import bal
 
-    return {PROBLEM: bal.FORMAT.to_bytes(collection_of(project)[0])}
+    return {PROBLEM: bal.to_bytes(collection_of(project)[0])}
 
 
 def project_of(found: Collection, path: Path, title: str, names: Sequence[str]) -> Project:

@@ -47,9 +47,18 @@ _GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b", "beta", "hx
 may be missing."""
 
 
+CameraFacts = tuple[str, list[tuple[str, int]], int, str, str]
+"""Formula, names of parameters with powers of the image unit, number of constants, direction, image y."""
+
+
 @cache
-def _models() -> dict[str, tuple[str, list[tuple[str, int]], int, str, str]]:
+def _models() -> dict[str, CameraFacts]:
     return dict(_photocore.camera_models())
+
+
+def camera_facts(model: str) -> CameraFacts:
+    """Return the facts of a model."""
+    return _models()[model]
 
 
 @cache
@@ -60,7 +69,7 @@ def _names() -> tuple[str, ...]:
 
 def parameter_names(model: str) -> tuple[str, ...]:
     """Return the names of the parameters of a model, in its order."""
-    return tuple(name for name, _ in _models()[model][1])
+    return tuple(name for name, _ in camera_facts(model)[1])
 
 
 def _model(name: str, value: str) -> str:
@@ -169,27 +178,23 @@ class Camera(Valued, Brief):
     @property
     def powers(self) -> dict[str, int]:
         """Power of the unit of image coordinates in the unit of each parameter."""
-        return dict(self._facts[1])
+        return dict(camera_facts(self.model)[1])
 
     @property
     def constants(self) -> frozenset[str]:
         """Parameters that are always fixed."""
-        names, count = self.names, self._facts[2]
+        names, count = self.names, camera_facts(self.model)[2]
         return frozenset(names[len(names) - count :])
 
     @property
     def direction(self) -> str:
         """Argument of the lens terms: ideal coordinates (`forward`) or measured (`backward`)."""
-        return self._facts[3]
+        return camera_facts(self.model)[3]
 
     @property
     def image_y(self) -> str:
         """Direction in which image y increases: `down` as pixel rows, or `up`."""
-        return self._facts[4]
-
-    @property
-    def _facts(self) -> tuple[str, list[tuple[str, int]], int, str, str]:
-        return _models()[self.model]
+        return camera_facts(self.model)[4]
 
     @property
     def values(self) -> Floats:
@@ -220,7 +225,7 @@ class Camera(Valued, Brief):
 
     def unit_of(self, name: str) -> str:
         """Return the unit of a parameter; empty for a dimensionless number."""
-        power = dict(self._facts[1])[name]
+        power = self.powers[name]
         return "" if power == 0 else f"{self.unit}" if power == 1 else f"{self.unit}^{power}"
 
     @property

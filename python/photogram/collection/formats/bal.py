@@ -15,14 +15,19 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.collection.collection import Collection
-from photogram.collection.formats.registry import Format
 from photogram.errors import InputError
 from photogram.io.packed_numbers import PIECE, at, whole
 from photogram.memory import require
 from photogram.words import phrase
 
+NAME, TITLE, SUFFIX = "bal", 'problem of "Bundle Adjustment in the Large"', ".txt"
 ROOM = 64  # Maximum mean number of characters of a number and the white space after it
 HEAD, IMAGE, PHOTO, POINT = 3, 4, 9, 3  # Counts of numbers in the first line, an image, a photo, a point
+
+
+def begins(_: bytes) -> bool:
+    """Return True: any text may be intended as this format; the reader reports errors."""
+    return True
 
 
 def read(path: Path, pieces: Iterator[bytes]) -> Collection:
@@ -93,14 +98,3 @@ def _numbers(path: Path, pieces: Iterator[bytes]) -> tuple[tuple[int, int, int],
     if counts is None or read < most:
         raise InputError(phrase("collection.ends", content=wanted), file=path)
     return counts, np.concatenate(parts)
-
-
-FORMAT = Format(
-    name="bal",
-    title='problem of "Bundle Adjustment in the Large"',
-    suffix=".txt",
-    # Any text may be intended as this format; the reader reports errors.
-    begins=lambda _: True,
-    read=read,
-    to_bytes=to_bytes,
-)

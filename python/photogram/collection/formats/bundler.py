@@ -18,12 +18,12 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.collection import Collection
-from photogram.collection.formats.registry import Format
 from photogram.errors import InputError
 from photogram.io.packed_numbers import at, whole
 from photogram.memory import require
 from photogram.words import Phrase, phrase
 
+NAME, TITLE, SUFFIX = "bundler", "Bundle file (Bundler, version 0.3)", ".out"
 HEADER = re.compile(rb"#[ \t]*Bundle file v(\S+)[^\n]*\n?")
 VERSION = b"0.3"
 COUNTS, CAMERA, POINT, VIEW = 2, 15, 7, 4  # Counts in the second line, a camera, a point and a view
@@ -65,6 +65,11 @@ class _Numbers:
     def fault(self, index: int, message: Phrase) -> InputError:
         """Return an error at the line of a number."""
         return at(self.path, self.words + index, message)
+
+
+def begins(content: bytes) -> bool:
+    """Return whether unpacked content begins as a file of this format."""
+    return HEADER.match(content) is not None
 
 
 def read(path: Path, pieces: Iterator[bytes]) -> Collection:
@@ -159,13 +164,3 @@ def to_bytes(collection: Collection) -> bytes:
 
 def _line(numbers: Floats) -> str:
     return " ".join(map(repr, numbers.tolist()))
-
-
-FORMAT = Format(
-    name="bundler",
-    title="Bundle file (Bundler, version 0.3)",
-    suffix=".out",
-    begins=lambda begin: HEADER.match(begin) is not None,
-    read=read,
-    to_bytes=to_bytes,
-)
