@@ -62,6 +62,17 @@ class Known:
         )
 
 
+def with_poses(block: Block, positions: Floats, attitudes: Floats) -> Block:
+    """Return the block with initial poses of photos; fixed values and observed values do not change."""
+    changes: dict[str, Floats] = {}
+    for name, values in (("position", positions), ("attitude", attitudes)):
+        given, sd = getattr(block, f"photo_{name}s"), getattr(block, f"photo_{name}_sd")
+        changes[f"photo_{name}s"] = np.where((sd == 0) & np.isfinite(given), given, values)
+        if getattr(block, f"photo_{name}s_observed") is None and np.isfinite(sd).any():
+            changes[f"photo_{name}s_observed"] = np.where(np.isfinite(sd), given, np.nan)
+    return block.replace(**changes)
+
+
 def _take_observations(block: Block, axes: Cartesian, centres: Floats, turned: Floats) -> None:
     """Insert observed attitudes A_obs B', and observed positions minus lever arms."""
     place = {name: row for row, name in enumerate(block.photo_ids)}

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Unpack, get_args
+from typing import TYPE_CHECKING, Unpack
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.first_features import started
-from photogram.adjustment.options import AdjustOptions, AsPublished, Ordering
+from photogram.adjustment.options import AdjustOptions, AsPublished
 from photogram.adjustment.remarks import (
     behind,
     check_cameras,
@@ -25,7 +26,7 @@ from photogram.adjustment.remarks import (
 from photogram.adjustment.robust import loss_row, remark
 from photogram.adjustment.taking_over import large_turns, stays, taken_over
 from photogram.adjustment.undetermined import beyond_trajectory, in_one_place, undetermined_combinations
-from photogram.arguments.arrays import argument_error, number, one_of, whole_number
+from photogram.arguments.arrays import argument_error, whole_number
 from photogram.arguments.fields import options_of
 from photogram.arguments.objects import kind_error
 from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
@@ -128,40 +129,31 @@ def adjust(
         If interrupted by Ctrl-C.
     """
     chosen = options_of(AdjustOptions, options, changes)
-    core = core_options(chosen, checked(block))
-    processors = core_threads(threads)
+    core, inner = options_in_datum(chosen, checked(block))
     check_cameras(block)
-    block = started(block)
-    core, inner = with_datum(block, core, chosen.constraints)
-    keep = chosen.covariance == "verdict"
-    result = _adjusted(block, core, processors, progress, inner, keep=keep)
+    again = partial(
+        adjusted,
+        options=core,
+        threads=threads,
+        progress=progress,
+        inner=inner,
+        keep=chosen.covariance == "verdict",
+    )
+    result = again(started(block))
     messages: list[Message] = []
     for _ in range(TURNS if block.all_trajectories else 0):
         if not (turns := large_turns(result)):
             break
         messages.append(taken_over(turns))
-        block = started(result.restarted(turns))
-        result = _adjusted(block, core, processors, progress, inner, keep=keep)
+        result = again(started(result.restarted(turns)))
     messages += stays(result) if block.all_trajectories else []
     result = replace(result, messages=[*messages, *result.messages]) if messages else result
     return result.with_max_bias_ratio(chosen.max_bias_ratio)
 
 
-def iteration_limit(block: Block, tolerance: float | AsPublished = 1e-5) -> int | None:
-    """Return the maximum number of iterations that free cameras need; None for the default."""
-    if any(each.knot_unknowns for each in block.cameras):
-        return OF_KNOTS
-    if isinstance(tolerance, AsPublished) or not any(
-        np.isinf(each.deviations).any() for each in block.cameras
-    ):
-        return None
-    return OF_CAMERAS
-
-
-def with_datum(
-    block: Block, options: CoreOptions, datum: InnerConstraints | MinimumConstraints | None
-) -> tuple[CoreOptions, DatumRow | None]:
-    """Return options with the minimum constraints of a block, and inner constraints for the core."""
+def options_in_datum(chosen: AdjustOptions, block: Block) -> tuple[CoreOptions, DatumRow | None]:
+    """Return options for the core with the minimum constraints of a block, and inner constraints."""
+    options, datum = core_options(chosen, block), chosen.constraints
     if isinstance(datum, MinimumConstraints):
         options = replace(options, minimum=minimum_row(block, datum))
     return options, datum_row(block, datum) if isinstance(datum, InnerConstraints) else None
@@ -175,7 +167,11 @@ def core_options(chosen: AdjustOptions, block: Block | None = None) -> CoreOptio
     if count is None:
         # Reweighting needs more iterations.
         count = AS_PUBLISHED if as_published else 50 if row is None else 200
-        count = (None if block is None else iteration_limit(block, tolerance)) or count
+        cameras = block.cameras if block else ()
+        if any(each.knot_unknowns for each in cameras):
+            count = OF_KNOTS
+        elif not as_published and any(np.isinf(each.deviations).any() for each in cameras):
+            count = OF_CAMERAS
     if chosen.unit_variance == "redundancy" and not chosen.covariance:
         raise InputError(phrase("adjust.redundancy-numbers"))
     if row and as_published:
@@ -192,29 +188,21 @@ def core_options(chosen: AdjustOptions, block: Block | None = None) -> CoreOptio
     )
 
 
-def adjusted_from(
+def adjusted(
     block: Block,
     options: CoreOptions,
     *,
-    threads: int | None,
-    progress: Callable[[Progress], None] | None = None,
-) -> Result:
-    """Adjust a block whose values and point positions are close to an adjusted state."""
-    options = replace(options, points_given=True)
-    return _adjusted(started(block), options, core_threads(threads), progress)
-
-
-def _adjusted(
-    block: Block,
-    options: CoreOptions,
-    processors: int,
+    threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
     inner: DatumRow | None = None,
-    *,
     keep: bool = False,
     start: _photocore.BlockState | None = None,
 ) -> Result:
-    network = block_network(block, options)
+    """Adjust a block from its initial values, or from the state of a result with other weights.
+
+    `keep` keeps the factor for a verdict.
+    """
+    processors, network = core_threads(threads), block_network(block, options)
     tested = tested_together(block) if keep else None
     try:
         call = None if progress is None else teller(progress)
@@ -231,16 +219,6 @@ def _adjusted(
             _, *measured = solution.redundancies
             freedom = round(sum(measured), 6)
         return Result.from_solution(block, solution, options, datum, messages, freedom)
-
-
-def adjusted_again(
-    block: Block, options: CoreOptions, start: _photocore.BlockState, *, threads: int | None
-) -> Result:
-    """Continue an adjustment of a block after a change of weights.
-
-    `options` and `start` are `options` and `state` of the former result.
-    """
-    return _adjusted(block, options, core_threads(threads), start=start)
 
 
 def messages_of(
@@ -268,14 +246,6 @@ def teller(
         progress(Progress(phase, done, total, Iteration(*iteration) if iteration else None))
 
     return tell
-
-
-def check_iteration(ordering: str, max_iterations: int, tolerance: float) -> None:
-    """Reject invalid options of an iteration."""
-    one_of("ordering", ordering, get_args(Ordering))
-    at_least("max_iterations", max_iterations, 1)
-    if not number("tolerance", tolerance) > 0:
-        raise argument_error("tolerance", "positive", value=tolerance)
 
 
 def at_least(name: str, value: object, least: int) -> int:

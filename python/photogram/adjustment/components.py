@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from photogram.adjustment.adjustment import adjust, adjusted_again, at_least
-from photogram.arguments.arrays import probability, truth_value
+from photogram.adjustment.adjustment import adjust, adjusted
 from photogram.arguments.objects import kind_error
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -47,9 +47,8 @@ class Weighing:
     def adjust(self, network: Any) -> AdjustedNetwork:
         """Adjust the network with other weights."""
         self.network = network
-        again = adjusted_again if isinstance(network, Block) else type(network)._adjust_again
-        options, state = self.result.options, self.result.state
-        self.result = again(network, options, start=state, threads=self.threads)
+        again = partial(adjusted, network) if isinstance(network, Block) else network._adjust_again
+        self.result = again(self.result.options, start=self.result.state, threads=self.threads)
         return self.result
 
 
@@ -137,11 +136,8 @@ def variance_components(
     AdjustmentError, RankError
         As in the adjustment.
     """
-    truth_value("equality", equality)
-    probability("tolerance", tolerance)
-    at_least("max_steps", max_steps, 1)
-    grouping = grouped(observables(network), groups)
     settings = Settings(tolerance, max_steps, least_redundancy, level, equality)
+    grouping = grouped(observables(network), groups)
     given: dict[str, Any] = {"held": held, "probing": probing, "threads": threads}
     return of_grouping(network, grouping, settings, **given, progress=progress)
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.adjustment.a_priori import Known
+from photogram.adjustment.a_priori import Known, with_poses
 from photogram.adjustment.adjustment import adjust
 from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Bools, Floats
@@ -403,14 +403,7 @@ def _started(
         new_positions[found] = axes.from_cartesian(positions[found])
         matrices = axes.to_local(attitudes[found], new_positions[found])
         new_attitudes[found] = Attitudes(matrices).values(angles_form(block.photo_to_ground))
-    changes: dict[str, Floats] = {}
-    for name, values in (("position", new_positions), ("attitude", new_attitudes)):
-        given, sd = getattr(block, f"photo_{name}s"), getattr(block, f"photo_{name}_sd")
-        fixed = (sd == 0) & np.isfinite(given)
-        changes[f"photo_{name}s"] = np.where(fixed, given, values)
-        if getattr(block, f"photo_{name}s_observed") is None and np.isfinite(sd).any():
-            changes[f"photo_{name}s_observed"] = np.where(np.isfinite(sd), given, np.nan)
-    return block.replace(**changes)
+    return with_poses(block, new_positions, new_attitudes)
 
 
 def _scale(block: Block, points: Floats) -> float:

@@ -11,15 +11,16 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from photogram import _photocore
+from photogram.adjustment.a_priori import with_poses
 from photogram.adjustment.adjustment import (
     Progress,
     adjust,
-    adjusted_from,
-    core_options,
+    adjusted,
     core_threads,
-    with_datum,
+    options_in_datum,
 )
 from photogram.adjustment.exchanged_names import exchanged_names
+from photogram.adjustment.first_features import started
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.adjustment.options import AdjustOptions
 from photogram.adjustment.remarks import check_cameras
@@ -140,10 +141,10 @@ def snoop_block(
     check_cameras(block)
     control = control or options.control
     chosen = AdjustOptions(**changes)
-    core, inner = with_datum(block, core_options(chosen, block), chosen.constraints)
+    core, inner = options_in_datum(chosen, block)
     datum = chosen.constraints
 
-    def adjusted(given: Block, **changes: Any) -> Result:
+    def adjusted_with(given: Block, **changes: Any) -> Result:
         without = replace(chosen, datum=None) if inner else chosen
         return adjust(given, without, threads=threads, progress=progress, **changes)
 
@@ -152,7 +153,7 @@ def snoop_block(
         if found is None:
             return None
         start, aside = found
-        trial.restart(core_trial(start, None, core, threads))
+        trial.restart(block_trial(start, None, core, threads).core)
         return aside
 
     has_held = any(
@@ -162,7 +163,7 @@ def snoop_block(
     @cache
     def held() -> list[Tested]:
         with suppress(AdjustmentError):
-            return held_tested(adjusted(block)) if has_held else []
+            return held_tested(adjusted_with(block)) if has_held else []
         return []
 
     def common(tests: Tests, standing: Standing) -> list[Phrase]:
@@ -189,26 +190,20 @@ def snoop_block(
     except (LostSupportError, _photocore.BlockError):
         # This adjustment names undetermined unknowns, or continues without some points.
         covariance = chosen.unit_variance == "redundancy"
-        first = adjusted(block, covariance=covariance)
+        first = adjusted_with(block, covariance=covariance)
         if not first.converged and options.robust is not False:
-            first = adjusted(block, covariance=covariance, loss="huber")
+            first = adjusted_with(block, covariance=covariance, loss="huber")
         trial, outcome = _snooped_from(first, options, threads, control)
     cleaned = _without(block, trial, outcome.out)
-    result = adjusted_from(cleaned, core, threads=threads, progress=progress)
+    near = replace(core, points_given=True)
+    result = adjusted(started(cleaned), near, threads=threads, progress=progress)
     exchanged = _exchanged(block, trial, outcome, result)
     if isinstance(datum, InnerConstraints) and result.converged:
         # Points without given coordinates define the datum at their first intersection.
         poses = {"photo_positions": block.photo_positions, "photo_attitudes": block.photo_attitudes}
-        again = adjusted(cleaned.replace(**poses), datum=datum)
+        again = adjusted_with(cleaned.replace(**poses), datum=datum)
         result = again if again.converged else result.in_datum(datum)
-    return finished(
-        result,
-        trial,
-        outcome,
-        options,
-        held=held,
-        exchanged=exchanged,
-    )
+    return finished(result, trial, outcome, options, held=held, exchanged=exchanged)
 
 
 def finished(
@@ -287,14 +282,8 @@ def block_trial(
     control: str = "plan and height",
 ) -> NetworkTrial:
     """Create the trial of a block for snooping, from the start or an adjusted state."""
-    return network_trial(block, core_trial(block, state, options, threads), control=control)
-
-
-def core_trial(
-    block: Block, state: _photocore.BlockState | None, options: CoreOptions, threads: int | None
-) -> _photocore.NetworkTrial:
-    options = replace(options, covariance=True, loss=None)
-    return block_network(block, options).trial(state, threads=core_threads(threads))
+    network = block_network(block, replace(options, covariance=True, loss=None))
+    return network_trial(block, network.trial(state, threads=core_threads(threads)), control=control)
 
 
 def _without(block: Block, trial: NetworkTrial, out: Out) -> Block:
@@ -359,7 +348,11 @@ def started_by_consensus(block: Block) -> tuple[Block, Aside] | None:
     }
     if len(wrong) > MOST_PHOTOS * len(block.photo_ids) or not (wrong or found.set_aside.any()):
         return None
-    return _started(block, found), Aside(np.flatnonzero(found.set_aside), wrong)
+    # Missing photos keep their given poses.
+    of_block = (found.block.photo_positions, found.block.photo_attitudes)
+    pairs = zip(of_block, (block.photo_positions, block.photo_attitudes), strict=True)
+    poses = (np.where(np.isnan(values), given, values) for values, given in pairs)
+    return with_poses(block, *poses), Aside(np.flatnonzero(found.set_aside), wrong)
 
 
 def _consensus(block: Block) -> FirstValues | None:
@@ -388,15 +381,3 @@ def _consensus(block: Block) -> FirstValues | None:
         if found.first_photo is None:
             return found
     return None
-
-
-def _started(block: Block, found: FirstValues) -> Block:
-    """Return the block with the computed poses; observed values do not change."""
-    changes: dict[str, Floats] = {}
-    for name in ("position", "attitude"):
-        given, sd = getattr(block, f"photo_{name}s"), getattr(block, f"photo_{name}_sd")
-        values = getattr(found.block, f"photo_{name}s")
-        changes[f"photo_{name}s"] = np.where((sd == 0) | np.isnan(values), given, values)
-        if getattr(block, f"photo_{name}s_observed") is None and np.isfinite(sd).any():
-            changes[f"photo_{name}s_observed"] = given
-    return block.replace(**changes)

@@ -10,16 +10,17 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import (
     Progress,
-    check_iteration,
+    core_options,
     core_threads,
     teller,
 )
-from photogram.adjustment.options import Ordering
+from photogram.adjustment.options import AdjustOptions, Ordering
 from photogram.adjustment.remarks import hardly_determined, harmful_points, hidden, rounded
-from photogram.adjustment.robust import Loss, loss_row, remark
+from photogram.adjustment.robust import Loss, remark
 from photogram.arguments.arrays import truth_value
 from photogram.collection.core_arrays import collection_network, named
 from photogram.collection.result import AdjustedCollection
+from photogram.lazy_dataclasses import replace
 from photogram.messages import Message, Undetermined
 from photogram.network.core_arrays import CoreOptions
 from photogram.words import phrase
@@ -94,18 +95,14 @@ def adjust(
     truth_value("covariance", covariance)
     if tolerance is None:
         tolerance = 1e-8 if loss is None else 1e-6
-    check_iteration(ordering, max_iterations, tolerance)
-    options = CoreOptions(
-        criterion="decrease",
-        limit=tolerance,
-        max_iterations=max_iterations,
+    chosen = AdjustOptions(
+        loss=loss,
         covariance=covariance,
-        loss=loss_row(loss),
+        tolerance=tolerance,
+        max_iterations=max_iterations,
         ordering=ordering,
-        unit_variance="constrained",
-        minimum=None,
-        points_given=True,
     )
+    options = replace(core_options(chosen), criterion="decrease", points_given=True)
     return adjusted(collection, options, threads=threads, progress=progress)
 
 

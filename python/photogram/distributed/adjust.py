@@ -17,9 +17,8 @@ from photogram import _photocore
 from photogram.adjustment.adjustment import (
     Progress,
     adjust,
-    core_options,
     core_threads,
-    with_datum,
+    options_in_datum,
 )
 from photogram.adjustment.first_features import started
 from photogram.adjustment.options import AdjustOptions
@@ -153,9 +152,7 @@ def _ready(block: Block, options: AdjustOptions) -> tuple[Block, CoreOptions, Da
     """
     check_cameras(checked(block))
     refuse_passages(block, "blocks in parts", but=Scan)
-    core = core_options(options, block)
-    block = started(block)
-    return block, *with_datum(block, core, options.constraints)
+    return started(block), *options_in_datum(options, block)
 
 
 @contextmanager

@@ -24,6 +24,7 @@ from typing import Protocol
 import numpy as np
 
 from photogram import _photocore
+from photogram.arguments.fields import Checked, option
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.statistics.distributions import bonferroni, critical_normal
@@ -162,7 +163,7 @@ def balanced(matrix: Floats, redundancy: Floats, exact: Sequence[bool]) -> Float
 
 
 @dataclass(frozen=True)
-class Settings:
+class Settings(Checked):
     """Options of :func:`estimate`.
 
     Attributes
@@ -181,8 +182,8 @@ class Settings:
         True to test that all are equal, with some additional adjustments.
     """
 
-    tolerance: float = 1e-4
-    max_steps: int = 100
+    tolerance: float = option(1e-4, 0, 1, is_open=True)
+    max_steps: int = option(100, 1)
     least_redundancy: float = LEAST_REDUNDANCY
     level: float = 0.05
     equality: bool = True

@@ -8,7 +8,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.adjustment.adjustment import Progress, adjust, adjusted_again
+from photogram.adjustment.adjustment import Progress, adjust, adjusted
 from photogram.adjustment.robust import Loss
 from photogram.adjustment.snooping import snoop
 from photogram.arguments.arrays import argument_error, one_of, shaped, value_field
@@ -381,9 +381,7 @@ class Calibration(Valued, Brief):
             elif start.regularise is None:
                 result = free
             else:
-                again = adjusted_again(weighted_block(start), free.options, free.state, threads=threads)
-                assert isinstance(again, Result)
-                result = again
+                result = adjusted(weighted_block(start), free.options, start=free.state, threads=threads)
             worse = marked_as_mrcal(result) if outliers else np.zeros(len(result.residuals), dtype=bool)
             if worse.any() and result.converged:
                 start = start.without(worse)

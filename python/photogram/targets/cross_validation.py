@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.adjustment import adjust, adjusted_again
+from photogram.adjustment.adjustment import adjust, adjusted
 from photogram.arguments.arrays import argument_error, whole_number
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError, RankError, message_of
@@ -286,7 +286,7 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
     own = [priors[each] for each in cameras]
     sd = np.concatenate([each.deviations for each in own])
     if (np.isfinite(sd) & (sd > 0)).any():
-        result = adjusted_again(part.block(own), result.options, result.state, threads=None)
+        result = adjusted(part.block(own), result.options, start=result.state)
     return Calibrated.of(result, part)
 
 
