@@ -145,7 +145,7 @@ def test_advice_names_functions_in_python_and_options_on_the_command_line():
 
 
 def test_rules_have_a_code_an_exit_code_and_advice():
-    steps = {f"advice.{name}" for rule in RULES for name in rule.advice}
+    steps = {f"advice.{name}" for rule in RULES for name in rule.advice.split()}
     of_program = {"advice.take-out", "advice.lens", "advice.lens-in-common"}
     assert steps - of_program <= table_of("en").keys()
     assert {rule.exit for rule in RULES} == {0, 3, 4}

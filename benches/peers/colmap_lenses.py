@@ -16,14 +16,14 @@ from solution import to_object_space
 from start import intersections
 
 from photogram import Block
-from photogram.network.directions import without_lenses
+from photogram.network.directions import seen_without_lenses
 
 NOT_HELD = 1e9
 
 
 def colmap_solution(block: Block) -> Callable[[], float]:
     """Return what solves a block by COLMAP and gives the weighted sum of squares; once only."""
-    points = intersections(without_lenses(block))
+    points = intersections(seen_without_lenses(block)[0])
     reconstruction, deviations = pycolmap.Reconstruction(), []
     for number, camera in enumerate(block.cameras):
         [sd] = np.unique(block.image_sd[block.photo_cameras[block.image_photos] == number])

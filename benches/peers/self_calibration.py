@@ -23,7 +23,7 @@ from start import intersections
 
 import photogram
 from photogram import Block, Camera
-from photogram.network.directions import without_lenses
+from photogram.network.directions import seen_without_lenses
 
 FREE = dict.fromkeys(("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"), np.inf)
 TRUE = (
@@ -52,7 +52,7 @@ def gtsam_solution(block: Block) -> Callable[[], float]:
     import gtsam
     from gtsam.symbol_shorthand import K, L, X
 
-    points = intersections(without_lenses(block))
+    points = intersections(seen_without_lenses(block)[0])
     graph, initial = gtsam.NonlinearFactorGraph(), gtsam.Values()
     for photo, pose in enumerate(poses(block)):
         initial.insert(X(photo), pose)

@@ -16,7 +16,7 @@ from photogram.cli.job import default_out
 from photogram.formats import crs
 from photogram.formats.xml_stream import LONGEST, MOST, read_stream, root_of
 from photogram.io.delimited import read_columns
-from photogram.network.directions import without_lenses
+from photogram.network.directions import seen_without_lenses
 from photogram.network.similarity import similarity
 
 EXAMPLE = Path(formats.__path__[0]).with_name("examples") / "project"
@@ -221,7 +221,7 @@ def test_a_camera_that_shows_everything_in_one_point_is_named():
     block = photogram.simulate(strips=1, photos_per_strip=3, points_per_photo=12, seed=5).block
     flat = photogram.Camera("pinhole", {"fx": 1e-30, "fy": 1e-30, "cx": 1000.0, "cy": 800.0}, name="flat")
     with pytest.raises(InputError, match="camera flat"):
-        without_lenses(
+        seen_without_lenses(
             block.replace(cameras=[flat], photo_cameras=np.zeros(3, int), principal_distances=None)
         )
 

@@ -75,7 +75,7 @@ def with_poses(block: Block, positions: Floats, attitudes: Floats) -> Block:
 
 def _take_observations(block: Block, axes: Cartesian, centres: Floats, turned: Floats) -> None:
     """Insert observed attitudes A_obs B', and observed positions minus lever arms."""
-    place = {name: row for row, name in enumerate(block.photo_ids)}
+    place = block._photo_rows
     positions = [each for each in block.observations.of_type(Position) if each.moment is None]
     for antenna in positions:
         centres[place[antenna.photos[0]]] = axes.positions(antenna.observed[np.newaxis, :3])[0]
@@ -100,10 +100,9 @@ def _take_observations(block: Block, axes: Cartesian, centres: Floats, turned: F
 def _control(block: Block, axes: Cartesian) -> tuple[Floats, Floats]:
     """Return positions and standard deviations of control in cartesian axes."""
     points, sd = block.point_positions.copy(), block.point_sd.copy()
-    place = {name: row for row, name in enumerate(block.point_ids)}
     for each in block.observations.of_type(Control):
-        points[place[each.point]] = each.observed
-        sd[place[each.point]] = np.sqrt(np.diagonal(each.precision))
+        row = block._point_rows[each.point]
+        points[row], sd[row] = each.observed, np.sqrt(np.diagonal(each.precision))
     held = np.isfinite(sd)
     points[~held.any(axis=1)] = np.nan
     if axes.spheroid is not None:

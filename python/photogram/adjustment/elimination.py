@@ -141,7 +141,6 @@ def _without(block: Block, test: TermsTest) -> Block:
     if camera.covariance is not None and set(camera.covariance[0]) & set(test.names):
         raise InputError(phrase("elimination.covariance", names=test.names, camera=test.camera))
     zero = dict.fromkeys(test.names, 0.0)
-    sd = camera.sd if isinstance(camera.sd, dict) else dict(zip(camera.names, camera.deviations, strict=True))
-    changed = camera.replace(parameters={**camera.parameters, **zero}, sd={**sd, **zero})
+    changed = camera.replace(parameters={**camera.parameters, **zero}, sd={**camera.sd, **zero})
     cameras = [changed if k == place else each for k, each in enumerate(block.cameras)]
     return block.replace(cameras=cameras)

@@ -57,8 +57,7 @@ class _Sites:
     def __init__(self, block: Block) -> None:
         self.block, self.axes = block, Cartesian(block.spheroid)
         self.known = Known.of(block, self.axes)
-        self.points = {name: row for row, name in enumerate(block.point_ids)}
-        self.photos = {name: row for row, name in enumerate(block.photo_ids)}
+        self.points, self.photos = block._point_rows, block._photo_rows
 
     def places(self, names: Sequence[str], of: Unknown, least: int) -> Floats:
         """Return (k, 3) known positions of points; InputError for fewer than `least`."""

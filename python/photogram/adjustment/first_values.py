@@ -408,11 +408,10 @@ def _started(
 
 def _scale(block: Block, points: Floats) -> float:
     """Return the ratio of observed to computed distances; 1 without observed distances."""
-    place = {name: row for row, name in enumerate(block.point_ids)}
+    place = block._point_rows
     ratios = [
         each.length / float(np.linalg.norm(points[place[each.first]] - points[place[each.second]]))
-        for each in block.observations
-        if isinstance(each, Distance)
+        for each in block.observations.of_type(Distance)
     ]
     known = [ratio for ratio in ratios if np.isfinite(ratio)]
     return float(np.median(known)) if known else 1.0

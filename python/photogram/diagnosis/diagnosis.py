@@ -91,7 +91,7 @@ class Diagnosis(Documented):
             exit=exit_code,
             warning=first is not None,
             lines=tuple(_message(each) for each in (others if self.grave else self._ordered) if each),
-            next=tuple(phrase(f"check.verdict.{name}") for name in rule.advice),
+            next=tuple(phrase(f"check.verdict.{name}") for name in rule.advice.split()),
             tests=() if self.result is None else self.result.verdict.tests,
             hints=tuple(each.text for each in self.grave if each.kind in CONVENTIONS),
         )
@@ -125,9 +125,9 @@ def _look(check: Diagnosis) -> Phrase | None:
 
 
 RULES = (
-    Rule("hint", partial(_grave, "hint"), EXIT_NOT_CONVERGED, ("correct",)),
-    Rule("gross-errors", partial(_grave, "gross-errors"), EXIT_NOT_CONVERGED, ("correct",)),
-    Rule("look-at", _look, 0, ("look", "adjust"), warning=True),
-    Rule("accepted", lambda _: phrase("check.verdict.accepted"), 0, ("adjust",)),
+    Rule("hint", partial(_grave, "hint"), EXIT_NOT_CONVERGED, "correct"),
+    Rule("gross-errors", partial(_grave, "gross-errors"), EXIT_NOT_CONVERGED, "correct"),
+    Rule("look-at", _look, 0, "look adjust", warning=True),
+    Rule("accepted", lambda _: phrase("check.verdict.accepted"), 0, "adjust"),
 )
 """Rules of a check; the first applicable one is the headline."""

@@ -15,7 +15,7 @@ from photogram.diagnosis.tested_values import FOUND, SURE, sizes_of_tests, sprea
 from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block, flown_by
-from photogram.network.directions import without_lenses
+from photogram.network.directions import seen_without_lenses
 from photogram.network.rays import Rays, meet
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, OBSERVATION, POSITION, BlockSuspects
 from photogram.results.result import Result
@@ -98,7 +98,7 @@ class Misfits:
             "photo_positions": self.result.photo_positions,
             "photo_attitudes": self.result.photo_attitudes,
         }
-        plain = without_lenses(block.replace(**poses))
+        plain, _ = seen_without_lenses(block.replace(**poses))
         if len(plain.image_xy) < len(block.image_xy):
             return explained
         rays = Rays.of(plain)

@@ -7,6 +7,7 @@ import math
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
@@ -25,7 +26,7 @@ from photogram.adjustment.options import AdjustOptions
 from photogram.adjustment.remarks import check_cameras
 from photogram.arguments.fields import options_of
 from photogram.distributed.cut import UNKNOWNS, Counts, alone_of, counted_work, incidence_of, vertices_of
-from photogram.distributed.datum import Mover
+from photogram.distributed.datum import nodes_in_datum
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Driver, Outcome
 from photogram.distributed.executors import Executor, Serial, Workers, check_workers, connected
@@ -237,11 +238,9 @@ class Run:
         `block` is the whole block, which is required for a transformation to a datum.
         """
         self.plan(measured=False).check()
-        options = self.manifest.options
-        found, mover = self.manifest, None
-        if block is not None and found.datum is not None:
-            mover = Mover(block, options, found.datum, found.held, found.middle)
-        return Driver(self.job, found.tree, self.executor, options, progress, mover).run(resume=True)
+        found = self.manifest
+        mover = None if block is None or found.datum is None else partial(nodes_in_datum, block, found)
+        return Driver(self.job, found.tree, self.executor, found.options, progress, mover).run(resume=True)
 
 
 @contextmanager

@@ -322,29 +322,14 @@ def outer_vertices(tree: Tree, owners: Indices, incidences: list[Incidence]) -> 
     return found
 
 
-@dataclass(frozen=True, eq=False)
-class Homes:
-    """Home nodes of points, images and other observations, and (P,) `owners` of photos.
-
-    A photo on a frame or trajectory belongs to the node of its representing photo.
-    """
-
-    owners: Indices
-    points: Indices
-    images: Indices
-    observations: Indices
-
-
 def vertices_of(block: Block) -> Indices:
     """Return (P,) representing photos: the frame, or the first photo on the trajectory."""
-    moves = bool(block.mounts or block.timed)
-    rows = {name: row for row, name in enumerate(block.photo_ids)} if moves else {}
     found = np.arange(len(block.photo_ids), dtype=np.int64)
     for each in block.mounts:
-        found[rows[each.photo]] = rows[each.frame]
+        found[block._photo_rows[each.photo]] = block._photo_rows[each.frame]
     first: dict[int, int] = {}
     for timed, trajectory in zip(block.timed, block.trajectories, strict=True):
-        row = rows[timed.photo]
+        row = block._photo_rows[timed.photo]
         found[row] = first.setdefault(id(trajectory), row)
     return found
 
@@ -414,7 +399,6 @@ def incidence_of_points(
     """
     vertices = vertices_of(block)
     points = {name: row for row, name in enumerate(names)} if observations else {}
-    photos = {name: row for row, name in enumerate(block.photo_ids)} if observations else {}
     tied = [tuple(points[name] for name in each.points) for each in observations]
     edges = joined(len(names), (each for each in tied if len(each) > 1))
     own_edges, others, of_observations, alone = [], [], [], alone_of(block)
@@ -425,7 +409,7 @@ def incidence_of_points(
         of_observations.append(edge)
         for name in photos_of(each, alone):
             own_edges.append(edge)
-            others.append(int(vertices[photos[name]]))
+            others.append(int(vertices[block._photo_rows[name]]))
     incidence = Incidence(
         np.concatenate([vertices[images[0]], np.array(others, dtype=np.int64)]),
         np.concatenate([edges[images[1]], np.array(own_edges, dtype=np.int64)]),

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
 from photogram.arguments.types import Floats
 from photogram.distributed.cut import Tree
-from photogram.distributed.datum import InDatum, Mover
+from photogram.distributed.datum import InDatum
 from photogram.distributed.executors import Executor, Handle
 from photogram.distributed.run import Course
 from photogram.distributed.tasks import (
@@ -68,7 +69,7 @@ class Outcome:
 
 
 class Driver:
-    """Partitioned adjustment; `mover` transforms the adjusted block to a datum."""
+    """Partitioned adjustment; `mover` transforms the values of all nodes to a datum."""
 
     def __init__(
         self,
@@ -77,7 +78,7 @@ class Driver:
         executor: Executor,
         options: CoreOptions,
         progress: Callable[[Progress], None] | None = None,
-        mover: Mover | None = None,
+        mover: Callable[[list[Any]], list[dict[str, np.ndarray]]] | None = None,
     ) -> None:
         self.job, self.options, self._mover = job, options, mover
         self._walks, self._course = Walks(job, tree, executor, progress), Course()
@@ -110,7 +111,7 @@ class Driver:
             course.initial = course.best = up.sum_of_squares
             if self._mover is not None:
                 # Reject an undefined datum before the adjustment.
-                self._in_datum(self._mover, course.state)
+                self._mover(self._walks.all(located, course.state, phase="solve"))
         return self._full_steps(up) if self.options.criterion == "percent" else self._damped_steps(up)
 
     def _full_steps(self, up: Up) -> Outcome:
@@ -251,7 +252,7 @@ class Driver:
             if up is not None:
                 self._walks.forget(up)
             formed = f"{after}-in-datum"
-            for node, arrays in enumerate(self._in_datum(self._mover, after)):
+            for node, arrays in enumerate(self._mover(self._walks.all(located, after, phase="solve"))):
                 write_state(self.job, node, formed, arrays)
             after, up = formed, None
         if up is None:
@@ -283,10 +284,6 @@ class Driver:
             course.before,
             course.formations,
         )
-
-    def _in_datum(self, mover: Mover, state: str) -> list[dict[str, np.ndarray]]:
-        """Transform a state of all nodes to the datum, with data for cofactors."""
-        return mover(self._walks.all(located, state, phase="solve"))
 
     def _evaluated(self, state: str) -> tuple[float, float, float, float, float]:
         """Return weighted sums of squares of all nodes, by type, and the objective function."""

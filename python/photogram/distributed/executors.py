@@ -227,12 +227,11 @@ def check_workers(client: Client, folder: Path) -> tuple[int, int | None, int]:
     others = sorted(address for address, version in versions.items() if version != own)
     if others:
         raise InputError(phrase("parts.versions", version=own, workers=others))
-    blind = [address for address, seen in client.run(os.path.isdir, str(folder)).items() if not seen]
-    if blind:
-        raise InputError(phrase("parts.no-shared-disk", workers=sorted(blind), folder=folder))
-    limits = [each for each in client.run(_limit).values() if each]
-    held = max(client.run(_held).values())
-    return len(versions), min(limits, default=None), held
+    facts: dict[str, tuple[bool, int | None, int]] = client.run(_facts, str(folder))
+    if blind := sorted(address for address, (seen, *_) in facts.items() if not seen):
+        raise InputError(phrase("parts.no-shared-disk", workers=blind, folder=folder))
+    limits = [limit for _, limit, _ in facts.values() if limit]
+    return len(versions), min(limits, default=None), max(held for *_, held in facts.values())
 
 
 def _library() -> Any:
@@ -249,18 +248,15 @@ def _version() -> str:
     return _photocore.__version__
 
 
-def _limit(dask_worker: Any = None) -> int | None:
-    """Return the memory limit of a worker in bytes; Dask supplies the argument by name."""
-    limit: int | None = dask_worker.memory_manager.memory_limit
-    return limit
+def _facts(folder: str, dask_worker: Any = None) -> tuple[bool, int | None, int]:
+    """Return whether a worker has a folder, its memory limit, and its memory in use, bytes.
 
-
-def _held() -> int:
-    """Return the memory of a worker after loading all modules and clearing earlier runs, bytes."""
+    Memory is used by all modules, without earlier runs. Dask supplies the worker by name.
+    """
     # These imports only allocate their memory in advance.
     import pyarrow.parquet  # noqa: F401
 
     import photogram.distributed.nodes  # noqa: F401
 
     shelf.clear_unless_used()
-    return resident_memory() or 0
+    return os.path.isdir(folder), dask_worker.memory_manager.memory_limit, resident_memory() or 0

@@ -45,7 +45,7 @@ class CoreEngine:
         ]
 
         def local(names: Names) -> list[tuple[str, int]]:
-            kinds = zip(("photo", "camera", "unknown"), rows, names.rows, strict=True)
+            kinds = zip(("photo", "camera", "unknown"), rows, names, strict=True)
             return [(kind, places[row]) for kind, places, each in kinds for row in each]
 
         places = rows[0]

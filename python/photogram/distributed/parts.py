@@ -4,19 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
-from photogram.distributed.cut import Homes, alone_of, photos_of, vertices_of
+from photogram.arguments.types import Indices
+from photogram.distributed.cut import alone_of, photos_of, vertices_of
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.errors import InputError
 from photogram.io.column_table import NameColumn
 from photogram.io.parquet import Column, parquet_content, read_sheet
 from photogram.io.seals import check_seal, recorded, seal
 from photogram.io.structure import Decoder, Encoder
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.films import Scan
 from photogram.network.subset import IMAGES, PHOTOS
@@ -53,79 +53,50 @@ class Part:
     common: tuple[Unknown, ...]
 
 
-@dataclass(frozen=True)
-class Names:
+class Names(NamedTuple):
     """Blocks of unknowns of nodes above, as ascending rows of the whole block."""
 
-    photos: list[int] = field(default_factory=list)
-    cameras: list[int] = field(default_factory=list)
-    unknowns: list[int] = field(default_factory=list)
-
-    def union(self, other: Names) -> Names:
-        """Return the union of two sets of names."""
-        return Names(*(sorted({*one, *two}) for one, two in zip(self.rows, other.rows, strict=True)))
-
-    @property
-    def rows(self) -> tuple[list[int], list[int], list[int]]:
-        """Rows of photos, cameras and unknowns."""
-        return self.photos, self.cameras, self.unknowns
+    photos: list[int]
+    cameras: list[int]
+    unknowns: list[int]
 
 
-@dataclass(frozen=True, eq=False)
-class AtHome:
-    """Points (n), images (m) and other observations at home in a node, as rows of the whole block.
+def part_of(block: Block, owners: Indices, homes: Mapping[str, Indices], node: int, below: Names) -> Part:
+    """Return the part of a node; nodes below contribute the names `below`.
 
-    Other arrays are as in a block. `image_photos` are rows of photos of the whole block, `image_points` are
-    rows of these points.
+    `homes` are the home nodes of `points`, `images` and `observations`.
     """
-
-    points: Indices
-    names: list[str]
-    point_positions: Floats
-    point_sd: Floats
-    images: Indices
-    image_photos: Indices
-    image_points: Indices
-    image_xy: Floats
-    image_sd: Floats
-    observations: Indices
+    rows = {name: np.flatnonzero(home == node) for name, home in homes.items()}
+    arrays = {name: getattr(block, name)[rows[of]] for of in ("points", "images") for name in TABLES[of]}
+    new_points = np.full(len(block.point_ids), -1, dtype=np.int64)
+    new_points[rows["points"]] = np.arange(len(rows["points"]))
+    arrays["image_points"] = new_points[arrays["image_points"]]
+    arrays["point_ids"] = [block.point_ids[row] for row in rows["points"]]
+    return assembled_part(block, owners, node, rows, arrays, below)
 
 
-def part_of(block: Block, homes: Homes, node: int, below: Names) -> Part:
-    """Return the part of a node; nodes below contribute the names `below`."""
-    images = np.flatnonzero(homes.images == node)
-    points = np.flatnonzero(homes.points == node)
-    new_points = np.full(len(homes.points), -1, dtype=np.int64)
-    new_points[points] = np.arange(len(points))
-    at_home = AtHome(
-        points,
-        [block.point_ids[row] for row in points],
-        block.point_positions[points],
-        block.point_sd[points],
-        images,
-        block.image_photos[images],
-        new_points[block.image_points[images]],
-        block.image_xy[images],
-        block.image_sd[images],
-        np.flatnonzero(homes.observations == node),
-    )
-    return assembled_part(block, homes.owners, node, at_home, below)
-
-
-def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, below: Names) -> Part:
+def assembled_part(
+    block: Block,
+    owners: Indices,
+    node: int,
+    rows: Mapping[str, Indices],
+    arrays: dict[str, Any],
+    below: Names,
+) -> Part:
     """Assemble a part from its points and observations and the names of nodes below.
 
-    The block may exclude points and images; `owners` are (P,) the nodes of all its photos.
+    The block may exclude points and images; `owners` are (P,) the nodes of all its photos. `rows` are
+    `points`, `images` and `observations` at home, in the whole block, `arrays` the fields of the part of
+    points and images. `image_photos` are rows of the whole block, `image_points` of the points of the part.
     """
-    own = [block.observations[row] for row in at_home.observations.tolist()]
+    own = [block.observations[row] for row in rows["observations"].tolist()]
     touched = owners == node
-    touched[at_home.image_photos] = True
+    touched[arrays["image_photos"]] = True
     touched[below.photos] = True
     if own or block.mounts or block.timed:
-        rows = {name: row for row, name in enumerate(block.photo_ids)}
         alone = alone_of(block) if own else {}
         for each in own:
-            touched[[rows[name] for name in photos_of(each, alone)]] = True
+            touched[[block._photo_rows[name] for name in photos_of(each, alone)]] = True
         # Include photos that represent others on frames and trajectories
         touched[vertices_of(block)[np.flatnonzero(touched)]] = True
     photos = np.flatnonzero(touched)
@@ -138,16 +109,9 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
     }
     present = set(names)
     reduced = block.replace(
-        **changes,
+        **changes | arrays | {"image_photos": new_photos[arrays["image_photos"]]},
         photo_ids=names,
-        point_ids=at_home.names,
-        point_positions=at_home.point_positions,
-        point_sd=at_home.point_sd,
         point_check_sd=None,  # stored in the whole block
-        image_photos=new_photos[at_home.image_photos],
-        image_points=at_home.image_points,
-        image_xy=at_home.image_xy,
-        image_sd=at_home.image_sd,
         observations=own,
         mounts=[each for each in block.mounts if each.photo in present],
         timed=[each for each in block.timed if each.photo in present],
@@ -162,9 +126,9 @@ def assembled_part(block: Block, owners: Indices, node: int, at_home: AtHome, be
         reduced,
         owners[photos],
         photos,
-        at_home.points,
-        at_home.images,
-        at_home.observations,
+        rows["points"],
+        rows["images"],
+        rows["observations"],
         np.array(unknowns, dtype=np.int64),
         tuple(block.unknowns[row] for row in unknowns),
     )
@@ -176,16 +140,12 @@ def names_above(
     shared: Indices,
     of_unknowns: Mapping[int, str],
     alone: Mapping[int, str],
-    *,
-    root: bool,
 ) -> Names:
-    """Return names of unknowns that a part passes to nodes above; empty for the root.
+    """Return names of unknowns that a part passes to nodes above.
 
     `shared` are the shared cameras of the whole block, `of_unknowns` is from :func:`photos_of_unknowns`,
     `alone` from :func:`alone_of`.
     """
-    if root:
-        return Names()
     # Photos that are represented by others add no unknowns.
     free = vertices_of(part.block) == np.arange(len(part.photos))
     photos = part.photos[(part.owners != part.node) & free]

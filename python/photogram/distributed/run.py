@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,6 @@ from photogram import _photocore
 from photogram.adjustment.adjustment import named
 from photogram.arguments.types import Floats, Indices
 from photogram.distributed.cut import (
-    Homes,
     Tree,
     alone_of,
     cut,
@@ -120,13 +119,15 @@ def partition(
     # Observations of shared unknowns without photos or points are at home in the root.
     nodes = homes(found.owners, incidence, found.tree.root)
     of_points = nodes[edges]
+    at_home = {"points": of_points, "images": of_points[block.image_points]}
+    at_home["observations"] = nodes[of_observations]
+    # A photo on a frame or trajectory belongs to the node of its representing photo.
     owners = found.owners[vertices_of(block)]
-    at_home = Homes(owners, of_points, of_points[block.image_points], nodes[of_observations])
     return divided(
         block,
         run,
         found.tree,
-        lambda node, below: part_of(block, at_home, node, below),
+        lambda node, below: part_of(block, owners, at_home, node, below),
         options,
         source,
         held,
@@ -153,39 +154,26 @@ def divided(
     seals: list[str] = []
     counts: list[tuple[int, int, int, int]] = []
     for node in range(len(tree)):
-        below = Names()
-        for child in tree.children[node]:
-            below = below.union(outer[child])
-        part = part_at(node, below)
-        root = node == tree.root
-        outer.append(names_above(part, below, shared, of_unknowns, alone, root=root))
+        children = [outer[child] for child in tree.children[node]]
+        below = Names(*(sorted({row for each in children for row in each[k]}) for k in range(3)))
+        part, root = part_at(node, below), node == tree.root
+        above = Names([], [], []) if root else names_above(part, below, shared, of_unknowns, alone)
+        outer.append(above)
         folder = part_folder(run, node)
         folder.mkdir(parents=True, exist_ok=True)
         seals.append(write_part(folder, part))
         own = np.flatnonzero(part.owners == node)
         stations = _weighted(part.block, own, shared, alone, part.common if root else None)
         counts.append((stations, len(own), len(part.points), len(part.images)))
-    weighted, photos, points, images = (list(column) for column in zip(*counts, strict=True))
-    middle = np.median(block.photo_positions, axis=0)
-    manifest = Manifest(
-        _photocore.__version__,
-        source,
-        tree,
-        outer,
-        (float(middle[0]), float(middle[1]), float(middle[2])),
-        options,
-        weighted,
-        photos,
-        points,
-        images,
-        seals,
-        held,
-        datum,
-    )
+    x, y, z = np.median(block.photo_positions, axis=0).tolist()
+    of_nodes: Any = map(list, zip(*counts, strict=True))
+    names = ("weighted", "photos", "points", "images")
+    shared = dict(zip(names, of_nodes, strict=True)) | {"seals": seals, "held": held, "datum": datum}
+    manifest = Manifest(_photocore.__version__, source, tree, outer, (x, y, z), options, **shared)
     # This file completes a partition.
     document = {name: getattr(manifest, name) for name in _PLAIN}
     document["parts"] = (len(manifest.tree) + 1) // 2
-    document["outer"] = [each.rows for each in manifest.outer]
+    document["outer"] = [list(each) for each in manifest.outer]
     document["options"] = asdict(manifest.options)
     write_json(run / MANIFEST, document)
     return manifest
@@ -308,10 +296,7 @@ class Course:
 
     def write(self, run: Path, source: str) -> None:
         """Write the progress to the folder of a run, with the hash of its block."""
-        document = {name: each for name, each in vars(self).items() if name != "iterations"}
-        document["iterations"] = [asdict(each) for each in self.iterations]
-        document["source"] = source
-        write_json(run / PROGRESS, document)
+        write_json(run / PROGRESS, asdict(self) | {"source": source})
 
     @classmethod
     def read(cls, run: Path, source: str) -> Course:
@@ -324,7 +309,6 @@ class Course:
         document = read_json(run / PROGRESS)
         if document.pop("source", None) != source:
             raise InputError(phrase("parts.other-progress"), file=run / PROGRESS)
-        rows: Iterable[dict[str, Any]] = document.pop("iterations")
-        ending = document.pop("ending")
-        iterations = [Iteration(**row) for row in rows]
-        return cls(**document, ending=None if ending is None else tuple(ending), iterations=iterations)
+        document["iterations"] = [Iteration(**row) for row in document["iterations"]]
+        document["ending"] = document["ending"] and tuple(document["ending"])
+        return cls(**document)

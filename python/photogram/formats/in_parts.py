@@ -15,6 +15,7 @@ from contextlib import ExitStack, contextmanager
 from functools import cached_property, reduce
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -37,7 +38,7 @@ from photogram.distributed.cut import (
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Outcome
 from photogram.distributed.files import alone, read_arrays, write_arrays
-from photogram.distributed.parts import AtHome, Names, Part, assembled_part
+from photogram.distributed.parts import Names, Part, assembled_part
 from photogram.distributed.run import Manifest, divided, places_of, with_flights
 from photogram.errors import InputError
 from photogram.formats.builder import ASSUMED_SD
@@ -184,8 +185,9 @@ class Streamed:
 
         def part_at(node: int, below: Names) -> Part:
             own = np.flatnonzero(observed == node)
-            at_home = self._at_home(node, unseen if node == root else [], own)
-            return assembled_part(self.block, owners, node, at_home, below)
+            rows, arrays = self._at_home(node, unseen if node == root else [])
+            rows["observations"] = own
+            return assembled_part(self.block, owners, node, rows, arrays, below)
 
         manifest = divided(self.block, run, found.tree, part_at, options, source, [])
         self.close()
@@ -275,8 +277,8 @@ class Streamed:
     def _incidences(self) -> Iterator[Incidence]:
         return (incidence for _, incidence, *_ in self._buckets())
 
-    def _at_home(self, node: int, unseen: list[str], observations: Indices) -> AtHome:
-        """Return the observations of a node from the pieces of all buckets."""
+    def _at_home(self, node: int, unseen: list[str]) -> tuple[dict[str, Indices], dict[str, Any]]:
+        """Return rows and arrays of points and images of a node from the pieces of all buckets."""
         found = self._gathered(f"node-{node}", [])
         names = [*found["names"].tolist(), *unseen]
         rows = np.array([self._given.get(name, -1) for name in names], dtype=np.int64)
@@ -286,18 +288,9 @@ class Streamed:
             self.block.point_positions[rows[known]],
             self.block.point_sd[rows[known]],
         )
-        return AtHome(
-            points=np.full(len(names), -1, dtype=np.int64),
-            names=names,
-            point_positions=positions,
-            point_sd=sd,
-            images=found["rows"],
-            image_photos=found["photos"],
-            image_points=found["points"],
-            image_xy=found["xy"],
-            image_sd=found["sd"],
-            observations=observations,
-        )
+        images = {f"image_{name}": found[name] for name in ("photos", "points", "xy", "sd")}
+        arrays = {"point_ids": names, "point_positions": positions, "point_sd": sd, **images}
+        return {"points": np.full(len(names), -1, dtype=np.int64), "images": found["rows"]}, arrays
 
 
 def _selected(parts: Iterable[ColumnTable], wanted: Callable[[ColumnTable], Bools]) -> ColumnTable | None:

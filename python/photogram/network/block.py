@@ -39,7 +39,6 @@ from photogram.network.observations import (
     Observations,
     all_trajectories,
     moments,
-    observation_rows,
     of_records,
 )
 from photogram.network.observations.columns import Group
@@ -244,6 +243,16 @@ class Block(Valued, Brief):
         return [*self.passages, *(Knots(row, knots) for row, knots in splined)]
 
     @cached_property
+    def _photo_rows(self) -> dict[str, int]:
+        """Row of each photo by name."""
+        return {name: row for row, name in enumerate(self.photo_ids)}
+
+    @cached_property
+    def _point_rows(self) -> dict[str, int]:
+        """Row of each point by name."""
+        return {name: row for row, name in enumerate(self.point_ids)}
+
+    @cached_property
     def unknowns(self) -> list[Unknown]:
         """Unknowns shared by observations, mounted photos and trajectories, in order."""
         own_unknowns = dict.fromkeys(self.observations.column("unknowns"))
@@ -258,8 +267,16 @@ class Block(Valued, Brief):
 
     @cached_property
     def observation_groups(self) -> list[Group]:
-        """Arrays for the core of the observations of each type."""
-        return observation_rows(self.observations, self.point_ids, self.photo_ids, self.unknowns)
+        """Arrays for the core of the observations of each type, in `core_order`.
+
+        Record times follow the photos. InputError if a point or photo is not in the block.
+        """
+        if not self.observations:
+            return []
+        records = enumerate(moments(self.observations), len(self.photo_ids))
+        photos = self._photo_rows | {each.name: row for row, each in records}
+        unknowns = {id(each): row for row, each in enumerate(self.unknowns)}
+        return [own.group(self._point_rows, photos, unknowns) for own in self.observations.columns]
 
     @property
     def image_unit(self) -> str:

@@ -50,6 +50,8 @@ def check_block(block: Block, changed: Collection[str]) -> None:
     changed = set(changed)
     if changed & {"photo_ids", "point_ids"}:
         changed = {each.name for each in fields(block)}
+        for name in ("_photo_rows", "_point_rows"):
+            vars(block).pop(name, None)
         for name, positions in (("photo_ids", "photo_positions"), ("point_ids", "point_positions")):
             names = getattr(block, name)
             names = numbered(length(positions, getattr(block, positions))) if names is None else names
@@ -149,7 +151,9 @@ def _check_observations(block: Block) -> None:
     _check_free_poses(block, [mount.photo for mount in block.mounts], "mounted")
     _check_timed(block)
     _check_motions(block)
-    block._set("passages", checked_passages(block.passages, block.point_ids, block.photo_ids))
+    block._set("passages", checked_passages(block.passages))
+    for each in block.passages:
+        each.of(block._point_rows, block._photo_rows)
     block._set("observations", with_smoothness(block.observations, block.trajectories))
     block._set("observations", with_knots(block.observations, block.cameras))
     _ = block.observation_groups  # rejects observations of other points and photos

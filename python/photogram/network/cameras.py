@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import cache, cached_property
-from typing import Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,7 +23,7 @@ from photogram.arguments.arrays import (
 from photogram.arguments.equality import Valued
 from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import kind_error, require
-from photogram.arguments.types import NONE, Floats, Indices, OptionalArray
+from photogram.arguments.types import NONE, ZERO, Floats, Indices, OptionalArray
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import converting_dataclass, field, replace
 from photogram.network.knots import Knot, checked_knot_sd, checked_knots, knot_names, knot_unknowns
@@ -40,6 +40,13 @@ ImageUnit = Literal["mm", "px"]  # Unit of image coordinates
 CameraRow = tuple[str, list[float], list[float], list[float] | None, list[float] | None]
 """Core row of a camera: model, parameters, standard deviations, covariance matrix of the weighted parameters
 row by row (None if uncorrelated), and knots (None without knots)."""
+
+if TYPE_CHECKING:
+    from photogram.arguments.types import Converted
+
+    Deviations = Converted[Mapping[str, float] | float, Mapping[str, float]]
+else:
+    Deviations = Mapping[str, float]
 
 _SPLINE = ("order", "nx", "ny", "fov_x_deg")
 _GIVEN = frozenset({"c", "f", "fx", "fy", "cx", "cy", "w", "h", "b", "beta", "hx", "hy", *_SPLINE})
@@ -121,7 +128,7 @@ class Camera(Valued, Brief):
 
     model: str = field(metadata={"check": _model})
     parameters: Mapping[str, float]
-    sd: Mapping[str, float] | float = 0.0
+    sd: Deviations = field(default=ZERO)
     name: str = field(default="", metadata={"check": text})
     unit: ImageUnit | None = None
     covariance: tuple[Sequence[str], ArrayLike] | None = None
@@ -204,11 +211,7 @@ class Camera(Valued, Brief):
     @property
     def deviations(self) -> Floats:
         """(k,) standard deviations in the order of the model: infinite is free, 0 is fixed."""
-        return np.array([self._sd[name] for name in self.names])
-
-    @property
-    def _sd(self) -> Mapping[str, float]:
-        return self.sd if isinstance(self.sd, Mapping) else {}
+        return np.array([*self.sd.values()])
 
     @property
     def is_held(self) -> bool:
@@ -301,8 +304,8 @@ class Camera(Valued, Brief):
         if self.covariance is None:
             return None
         names, matrix = self.covariance
-        weighted = [name for name in self.names if 0 < self._sd[name] < math.inf]
-        whole = np.diag([self._sd[name] ** 2 for name in weighted])
+        weighted = [name for name, sd in self.sd.items() if 0 < sd < math.inf]
+        whole = np.diag([self.sd[name] ** 2 for name in weighted])
         rows = [weighted.index(name) for name in names]
         own = np.asarray(matrix)
         whole[np.ix_(rows, rows)] = (own + own.T) / 2

@@ -15,8 +15,6 @@ from photogram.network.block import Block
 from photogram.network.motion import timed_images
 from photogram.network.moving_photos import Moment
 from photogram.network.observations import moments
-from photogram.network.passages import passage_rows
-from photogram.network.rigs import mount_rows
 from photogram.network.unknowns import Unknown
 
 CoreNetwork = _photocore.BlockNetwork | _photocore.CollectionNetwork
@@ -53,7 +51,11 @@ def block_network(
     `further` are shared unknowns of a larger block that this part does not observe. They follow its own.
     """
     unknowns = [*block.unknowns, *further]
-    flown, image_xy, records = _flown(block, unknowns)
+    places = {id(each): row for row, each in enumerate(unknowns)}
+    flown, image_xy, records = _flown(block, places)
+    # On a trajectory, a photo represents its own frame.
+    mounts = [(each.photo, each.frame, each.sensor) for each in block.mounts]
+    mounts += [(each.photo, each.photo, each.sensor) for each in block.timed if each.sensor is not None]
     cameras, photo_cameras = block.core_cameras()
     positions, attitudes = block.photo_positions_observed, block.photo_attitudes_observed
     known = np.zeros_like(records)
@@ -78,9 +80,20 @@ def block_network(
         block.image_sd,
         observation_groups=block.observation_groups,
         unknowns=[each.row() for each in unknowns],
-        mounts=mount_rows(block.mounts, block.timed, block.photo_ids, unknowns),
+        mounts=[
+            (block._photo_rows[photo], block._photo_rows[frame], places[id(sensor)])
+            for photo, frame, sensor in mounts
+        ],
         **flown,
-        passages=passage_rows(block.all_passages, block.point_ids, block.photo_ids, unknowns),
+        passages=[
+            (
+                each.KIND,
+                [places[id(own)] for own in each.unknowns],
+                each.of(block._point_rows, block._photo_rows),
+                each.numbers(),
+            )
+            for each in block.all_passages
+        ],
         records=len(records),
         spheroid=(block.spheroid.a, block.spheroid.b) if block.spheroid else None,
         photo_to_ground=block.photo_to_ground,
@@ -90,15 +103,14 @@ def block_network(
     )
 
 
-def _flown(block: Block, unknowns: Sequence[Unknown]) -> tuple[dict[str, Any], Floats, Floats]:
+def _flown(block: Block, places: dict[int, int]) -> tuple[dict[str, Any], Floats, Floats]:
     """Return trajectory arguments, focal-plane images (m, 2) and record positions (r, 3).
 
-    Records follow the photos of the block.
+    Records follow the photos of the block. `places` are indices of unknowns by object identity.
     """
     records = moments(block.observations)
     if not block.timed and not records:
         return {"trajectories": [], "timed": [], "image_times": np.zeros(0)}, block.image_xy, np.zeros((0, 3))
-    places = {id(each): row for row, each in enumerate(unknowns)}
     trajectories = block.all_trajectories
     numbers = {id(each): number for number, each in enumerate(trajectories)}
     image_xy, image_times = block.image_xy.copy(), np.zeros(len(block.image_xy))

@@ -129,10 +129,9 @@ def minimum_row(block: Block, datum: MinimumConstraints) -> tuple[int, tuple[int
 
 def _indices(block: Block, kind: str, wanted: Sequence[str] | None) -> list[int]:
     """Return the rows of named photos or points; all rows if `wanted` is None."""
-    ids = block.photo_ids if kind == "photo" else block.point_ids
+    index = block._photo_rows if kind == "photo" else block._point_rows
     if wanted is None:
-        return list(range(len(ids)))
-    index = {name: i for i, name in enumerate(ids)}
+        return list(range(len(index)))
     if missing := [name for name in wanted if name not in index]:
         raise argument_error("datum", "absent", kind=kind, name=missing[0])
     return [index[name] for name in wanted]

@@ -31,19 +31,14 @@ def image_directions(block: Block) -> Floats:
     return directions
 
 
-def without_lenses(block: Block) -> Block:
-    """Convert a block to cameras without distortion, in the unit of its images.
-
-    A block with principal distances is returned unchanged. If most directions are undefined (e.g. in another
-    unit), lenses are ignored and cameras are linear. Otherwise images without a direction in front of the
-    camera are removed. Scanner images are always removed, because they have varying poses. Trajectories are
-    removed as well.
-    """
-    return seen_without_lenses(block)[0]
-
-
 def seen_without_lenses(block: Block) -> tuple[Block, Bools]:
-    """Return the block of :func:`without_lenses`, and (m,) the images that it contains."""
+    """Convert a block to cameras without distortion; return also (m,) the images that it contains.
+
+    Cameras are in the unit of the images. A block with principal distances is returned unchanged. If most
+    directions are undefined (e.g. in another unit), lenses are ignored and cameras are linear. Otherwise
+    images without a direction in front of the camera are removed. Scanner images are always removed, because
+    they have varying poses. Trajectories are removed as well.
+    """
     pictured: Bools = ~scanners(block)[block.image_photos]
     if not block.cameras or block.photo_cameras is None:
         plain = block.replace(timed=()) if block.timed else block

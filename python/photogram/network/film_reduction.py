@@ -35,11 +35,10 @@ def camera_images(block: Block) -> Floats:
 
     NaN for a reading outside the film model. Images of other photos are unchanged.
     """
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
     found = block.image_xy
     for scan in (each for each in block.passages if isinstance(each, Scan)):
         found = found.copy() if found is block.image_xy else found
-        own = block.image_photos == rows[scan.photo]
+        own = block.image_photos == block._photo_rows[scan.photo]
         vectors = np.array([each.position for each in scan.film.unknowns])
         found[own] = _photocore.film_places(scan.film.numbers(), vectors, block.image_xy[own])
     return found
@@ -50,7 +49,6 @@ def _to_marks(block: Block, images: Floats) -> Floats:
     read: dict[str, list[Fiducial]] = {}
     for each in block.observations.of_type(Fiducial):
         read.setdefault(each.photo, []).append(each)
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
     for photo, own in read.items():
         film = own[0].film
         vectors = np.array([each.position for each in film.unknowns])
@@ -62,7 +60,7 @@ def _to_marks(block: Block, images: Floats) -> Floats:
         affine, *_ = np.linalg.lstsq(_with_one(found), places, rcond=None)
         away = np.abs(_with_one(found) @ affine - places).max()
         if away < FIT * np.ptp(places, axis=0).max():
-            of_photo = block.image_photos == rows[photo]
+            of_photo = block.image_photos == block._photo_rows[photo]
             images[of_photo] = _with_one(images[of_photo]) @ affine
     return images
 
@@ -80,9 +78,8 @@ def as_seen(block: Block) -> Block:
     if not is_scanned(block):
         return block
     pitches = np.ones(len(block.photo_ids))
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
     for scan in (each for each in block.passages if isinstance(each, Scan)):
-        pitches[rows[scan.photo]] = scan.film.readings.pitch
+        pitches[block._photo_rows[scan.photo]] = scan.film.readings.pitch
     return block.replace(
         image_xy=_to_marks(block, camera_images(block)),
         image_sd=block.image_sd * pitches[block.image_photos, np.newaxis],

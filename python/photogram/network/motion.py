@@ -80,8 +80,7 @@ def timed_images(block: Block) -> Iterator[tuple[Timed, Trajectory, int, Indices
     """Yield timed photos with their trajectory, index and image indices."""
     if not block.timed:
         return
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
-    images = rows_of_each(block.image_photos, len(rows))
+    rows, images = block._photo_rows, rows_of_each(block.image_photos, len(block.photo_ids))
     for own, trajectory in zip(block.timed, block.trajectories, strict=True):
         yield own, trajectory, rows[own.photo], images[rows[own.photo]]
 

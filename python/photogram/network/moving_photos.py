@@ -328,9 +328,8 @@ def require_photos(name: str, own: Sequence[str], photos: Sequence[str]) -> None
 
 def own_trajectories(block: Block) -> list[Trajectory]:
     """Return the trajectory of each timed photo: the given one, or uniform motion."""
-    rows = {name: row for row, name in enumerate(block.photo_ids)} if block.timed else {}
     return [
-        _uniform(block, each, rows[each.photo]) if each.trajectory is None else each.trajectory
+        _uniform(block, each, block._photo_rows[each.photo]) if each.trajectory is None else each.trajectory
         for each in block.timed
     ]
 

@@ -15,9 +15,6 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.unknowns import Numbers, Unknown
 
-PassageRow = tuple[str, list[int], list[int], Floats]
-"""Core row: type, indices of unknowns, indices of points, photos or cameras, and numbers."""
-
 
 class Bend(Numbers):
     """Deflection w of a board, two lengths: at its centre along x and along y."""
@@ -100,32 +97,10 @@ class Figure(Passage):
         return np.asarray(self.shifts, dtype=float).ravel()
 
 
-def checked_passages(passages: object, points: Sequence[str], photos: Sequence[str]) -> tuple[Passage, ...]:
-    """Return validated image transformations of points and photos in a block."""
+def checked_passages(passages: object) -> tuple[Passage, ...]:
+    """Return validated image transformations."""
     checked = elements("passages", passages, Passage)
     for row, each in enumerate(checked):
         if not each.KIND:
             raise kind_error(f"passages[{row}]", "a Figure or a Scan", each)
-    _places(checked, points, photos)
     return checked
-
-
-def passage_rows(
-    passages: Sequence[Passage], points: Sequence[str], photos: Sequence[str], unknowns: Sequence[Unknown]
-) -> list[PassageRow]:
-    """Convert image transformations to rows for the core."""
-    if not passages:
-        return []
-    rows = {id(each): row for row, each in enumerate(unknowns)}
-    places = _places(passages, points, photos)
-    return [
-        (each.KIND, [rows[id(own)] for own in each.unknowns], of, each.numbers())
-        for each, of in zip(passages, places, strict=True)
-    ]
-
-
-def _places(passages: Sequence[Passage], points: Sequence[str], photos: Sequence[str]) -> list[list[int]]:
-    if not passages:
-        return []
-    of_points, of_photos = ({name: row for row, name in enumerate(own)} for own in (points, photos))
-    return [each.of(of_points, of_photos) for each in passages]

@@ -8,12 +8,9 @@ from photogram.arguments.arrays import elements, object_name
 from photogram.arguments.fields import check_fields
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.network.moving_photos import Timed, require_photos
-from photogram.network.unknowns import Sensor, Unknown
+from photogram.network.moving_photos import require_photos
+from photogram.network.unknowns import Sensor
 from photogram.words import phrase
-
-MountRow = tuple[int, int, int]
-"""Indices of a photo, of the photo that represents its frame, and of its sensor among the unknowns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,14 +46,3 @@ def checked_mounts(mounts: object, photos: Sequence[str]) -> tuple[Mount, ...]:
     if both := sorted(frames & {each.photo for each in checked}):
         raise InputError(phrase("block.mounted-frame", photo=both[0]))
     return checked
-
-
-def mount_rows(
-    mounts: Sequence[Mount], timed: Sequence[Timed], photos: Sequence[str], unknowns: Sequence[Unknown]
-) -> list[MountRow]:
-    """Convert mounts to rows for the core; on a trajectory, a photo represents its own frame."""
-    on_frames = [(each.photo, each.frame, each.sensor) for each in mounts]
-    on_frames += [(each.photo, each.photo, each.sensor) for each in timed if each.sensor is not None]
-    places = {name: row for row, name in enumerate(photos)} if on_frames else {}
-    sensors = {id(each): row for row, each in enumerate(unknowns)}
-    return [(places[photo], places[frame], sensors[id(sensor)]) for photo, frame, sensor in on_frames]

@@ -41,10 +41,9 @@ def with_parameters(camera: Camera, words: Collection[str]) -> Camera:
 
 def freed(camera: Camera, words: Collection[str]) -> Camera:
     """Return a camera whose named parameters are free; standard deviations of others are unchanged."""
-    known = zip(camera.names, camera.deviations.tolist(), strict=True)
     sd = {
         name: math.inf if matching_word(name, words) and name not in camera.constants else value
-        for name, value in known
+        for name, value in camera.sd.items()
     }
     covariance = camera.covariance
     if covariance is not None:
@@ -61,25 +60,19 @@ def calibration_words(camera: Camera) -> list[str]:
     fixed lens term if there is one.
     """
     models = _models(camera)
-    model = next((each for each in models if any(name.lower() in _LENS for name in _fixed(each))), camera)
-    if not _fixed(model):
-        return []
-    values = zip(model.names, model.deviations.tolist(), strict=True)
-    return list(
-        dict.fromkeys(
-            "f" if name in ("fx", "fy") else name
-            for name, sd in values
-            if name.lower() in (*_INTERIOR, *_LENS) and name not in model.constants and sd in (0, math.inf)
-        )
+    model = next(
+        (each for each in models if any(name.lower() in _LENS for name in _with_sd(each, 0))), camera
     )
+    if not _with_sd(model, 0):
+        return []
+    names = _with_sd(model, 0, math.inf)
+    return list(dict.fromkeys("f" if name in ("fx", "fy") else name for name in names))
 
 
-def _fixed(camera: Camera) -> list[str]:
-    return [
-        name
-        for name, sd in zip(camera.names, camera.deviations.tolist(), strict=True)
-        if name.lower() in (*_INTERIOR, *_LENS) and name not in camera.constants and sd == 0
-    ]
+def _with_sd(camera: Camera, *deviations: float) -> list[str]:
+    """Return parameters of the interior orientation with one of some standard deviations."""
+    known = {name for name in camera.names if name.lower() in (*_INTERIOR, *_LENS)} - camera.constants
+    return [name for name, sd in camera.sd.items() if name in known and sd in deviations]
 
 
 def calibrated(camera: Camera) -> Camera:
@@ -94,8 +87,7 @@ def with_one_focal_length(camera: Camera, size: tuple[float, float] | None = Non
     The camera is unchanged if fx differs from fy, or if no model contains its values and unknowns. It is also
     unchanged if that model requires the missing `size` of the image (width and height in pixels).
     """
-    sd = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
-    values = camera.parameters
+    sd, values = camera.sd, camera.parameters
     if "fx" not in values or values["fx"] != values["fy"] or sd["fx"] != sd["fy"]:
         return camera
     if camera.covariance is not None:
@@ -153,8 +145,7 @@ def _in_model(
     same = _same_parameters(camera.model, model, used)
     if same is None:
         return None
-    sd = dict(zip(camera.names, camera.deviations.tolist(), strict=True))
-    deviations = {other: sd[name] for name, others in same.items() for other in others}
+    deviations = {other: camera.sd[name] for name, others in same.items() for other in others}
     try:
         values = _renamed(camera.parameters, same, model, size)
         return replace(camera, model=model, parameters=values, sd=deviations)

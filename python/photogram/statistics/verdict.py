@@ -105,7 +105,7 @@ class Rule:
     code: str
     message: Callable[[Any], Phrase | None]  # Message on the evidence; None if the rule is not applicable
     exit: int  # Exit code, if `grave` applies to the evidence
-    advice: tuple[str, ...]  # Codes of the next steps, if it defines the headline
+    advice: str = ""  # Codes of the next steps, if it defines the headline
     warning: bool = False  # Whether a user should look although the exit code is 0
     grave: Callable[[Any], bool] = lambda _: True  # Whether it forbids the use
     also: bool = False  # Whether the message has the variant `.also` for verdicts that forbid the use
@@ -186,7 +186,7 @@ def _next_steps(rule: Rule, e: Evidence, *, usable: bool) -> tuple[Phrase, ...]:
         "iterate": found.iterate,
     }
     steps: list[Text] = []
-    for name in rule.advice:
+    for name in rule.advice.split():
         if name in of_program:
             steps += filter(None, [of_program[name]])
         else:
@@ -195,11 +195,24 @@ def _next_steps(rule: Rule, e: Evidence, *, usable: bool) -> tuple[Phrase, ...]:
     return tuple(map(as_phrase, steps)) or ((Phrase("advice.nothing"),) if usable else ())
 
 
-def _listing(code: str, name: str, attribute: str) -> Callable[[Evidence], Phrase | None]:
+def _look(
+    code: str,
+    message: Callable[[Any], Phrase | None],
+    advice: str,
+    *,
+    grave: Callable[[Any], bool] | None = None,
+    also: bool = False,
+) -> Rule:
+    """Return a rule with a warning, which forbids the use only if it is grave."""
+    exit_code = EXIT_NOT_USABLE if grave else 0
+    return Rule(code, message, exit_code, advice, warning=True, grave=grave or bool, also=also)
+
+
+def _listing(code: str, name: str, attribute: str = "") -> Callable[[Evidence], Phrase | None]:
     """Return the function that creates a message with a list of findings, if any."""
 
     def message(e: Evidence) -> Phrase | None:
-        listed = list(getattr(e.found, attribute))
+        listed = list(getattr(e.found, attribute or code))
         return Phrase(f"verdict.{code}", {name: listed}) if listed else None
 
     return message
@@ -250,6 +263,10 @@ def _is_grave(e: Evidence) -> bool:
     """Whether a common error moves points, or causes that the result is refused."""
     removed = e.found.snooped is not None and e.found.snooped.excessive
     return bool(e.found.common_is_harmful or e.pattern or removed or e.disagreement(WITHHELD))
+
+
+def _lack_control(e: Evidence) -> bool:
+    return any(getattr(name, "code", "") == CONTROL for name in e.found.unsupported)
 
 
 def _remedy(e: Evidence) -> Phrase | str:
@@ -370,126 +387,47 @@ def _not_tested(e: Evidence) -> Phrase | None:
 
 CONTROL = "named.control"  # Code of the name of a control point
 
-_WITH_CHECK = frozenset(
-    {
-        "first-values",
-        "determine",
-        "common-of-images",
-        "common-of-observations",
-        "wrong-checks",
-        "largest-tests",
-    }
-)
+_WITH_CHECK = {"first-values", "determine", "common-of-images", "common-of-observations", "wrong-checks"}
+_WITH_CHECK |= {"largest-tests"}
 """Advice that names how the program searches for mistakes of the input."""
 
-_EXPLAINING = frozenset(
-    {
-        "common-error",
-        "gross-errors",
-        "too-much-removed",
-        "usable-after-removal",
-        "intersection",
-        "weights",
-        "weights-of-groups",
-        "weights-of-types",
-        "model",
-    }
-)
+_EXPLAINING = {"common-error", "gross-errors", "too-much-removed", "usable-after-removal", "intersection"}
+_EXPLAINING |= {"weights", "weights-of-groups", "weights-of-types", "model"}
 """Rules that explain residuals that are too large."""
 
+_unchecked = _listing("accepted-not-checked", "errors", "unchecked")
+
 RULES = (
-    Rule(
-        "not-converged",
-        _not_converged,
-        EXIT_NOT_CONVERGED,
-        ("no-results", "iterate", "first-values", "take-out"),
-    ),
-    Rule(
-        "undetermined",
-        _listing("undetermined", "names", "undetermined"),
-        EXIT_NOT_CONVERGED,
-        ("determine",),
-    ),
-    Rule(
-        "duplicates",
-        _listing("duplicates", "duplicates", "duplicates"),
-        EXIT_NOT_USABLE,
-        ("remove-duplicates",),
-    ),
-    Rule("hint", _listing("hint", "hints", "hints"), EXIT_NOT_USABLE, ("correct",)),
-    Rule("identification", _listing("identification", "names", "doubtful"), EXIT_NOT_USABLE, ("exposures",)),
-    Rule(
-        "changed",
-        _listing("changed", "names", "changed"),
-        EXIT_NOT_USABLE,
-        ("before-and-after", "cause-of-change"),
-    ),
-    Rule("weights-of-types", weight_rules.wrong_type, EXIT_NOT_USABLE, ("sd-of-types",)),
-    Rule(
-        "common-error",
-        _common_error,
-        EXIT_NOT_USABLE,
-        ("correct-common", "lens-in-common"),
-        warning=True,
-        grave=_is_grave,
-    ),
-    Rule(
-        "unsupported",
-        _listing("unsupported", "names", "unsupported"),
-        EXIT_NOT_USABLE,
-        ("measure-again",),
-        warning=True,
-        grave=lambda e: any(getattr(name, "code", "") == CONTROL for name in e.found.unsupported),
-    ),
-    Rule("disputed", _disputed, EXIT_NOT_USABLE, ("measure-again",)),
-    Rule("gross-errors", _gross_errors, EXIT_NOT_USABLE, ("look-at-gross-errors", "lens", "take-out")),
-    Rule("too-much-removed", _too_much_removed, EXIT_NOT_USABLE, ("common-of-observations",)),
-    Rule("usable-after-removal", _removed, 0, ("measure-again", "after-selection"), also=True),
-    Rule("model", _model, EXIT_NOT_USABLE, ("calibrate", "frame")),
-    Rule("too-much-set-aside", partial(_set_aside, True), EXIT_NOT_USABLE, ("common-of-images",)),
-    Rule("set-aside", partial(_set_aside, False), 0, ("look-at-images",), warning=True, also=True),
-    Rule("check-points", _checks, EXIT_NOT_USABLE, ("wrong-checks", "cause-first")),
-    Rule("look-at-check-points", _suspect_checks, 0, ("look-at-checks",), warning=True),
-    Rule(
-        "intersection",
-        weight_rules.intersected,
-        EXIT_NOT_USABLE,
-        ("adjust-photos",),
-        warning=True,
-        grave=weight_rules.is_far,
-    ),
-    Rule("weights-of-types", weight_rules.types_with_common_factor, EXIT_NOT_USABLE, ("sd-of-types",)),
-    Rule("weights", partial(weight_rules.common_factor, True), EXIT_NOT_USABLE, ("scaled", "larger-sd")),
-    Rule("weights", partial(weight_rules.common_factor, False), 0, ("scaled", "larger-sd"), warning=True),
-    Rule(
-        "weights-of-groups",
-        weight_rules.components,
-        EXIT_NOT_USABLE,
-        ("sd-of-groups",),
-        warning=True,
-        grave=weight_rules.has_far_groups,
-    ),
-    Rule("uncontrolled", _uncontrolled, 0, ("measure-more",), warning=True),
-    Rule(
-        "unexplained",
-        _unexplained,
-        EXIT_NOT_USABLE,
-        ("largest-tests", "take-out"),
-        warning=True,
-        grave=weight_rules.is_far,
-    ),
-    Rule("not-accurate-enough", lambda e: e.found.shortfall, EXIT_NOT_USABLE, ("more-views",)),
-    Rule("look-at", _look_at, 0, ("look-at",), warning=True, also=True),
-    Rule("weights-pessimistic", weight_rules.too_low, 0, ("scaled", "smaller-sd")),
-    Rule(
-        "accepted-not-checked",
-        _listing("accepted-not-checked", "errors", "unchecked"),
-        0,
-        ("check-undetected",),
-        warning=True,
-        also=True,
-    ),
-    Rule("accepted", _accepted, 0, ()),
-    Rule("not-tested", _not_tested, 0, ("compare",)),
+    Rule("not-converged", _not_converged, EXIT_NOT_CONVERGED, "no-results iterate first-values take-out"),
+    Rule("undetermined", _listing("undetermined", "names"), EXIT_NOT_CONVERGED, "determine"),
+    Rule("duplicates", _listing("duplicates", "duplicates"), EXIT_NOT_USABLE, "remove-duplicates"),
+    Rule("hint", _listing("hint", "hints", "hints"), EXIT_NOT_USABLE, "correct"),
+    Rule("identification", _listing("identification", "names", "doubtful"), EXIT_NOT_USABLE, "exposures"),
+    Rule("changed", _listing("changed", "names"), EXIT_NOT_USABLE, "before-and-after cause-of-change"),
+    Rule("weights-of-types", weight_rules.wrong_type, EXIT_NOT_USABLE, "sd-of-types"),
+    _look("common-error", _common_error, "correct-common lens-in-common", grave=_is_grave),
+    _look("unsupported", _listing("unsupported", "names"), "measure-again", grave=_lack_control),
+    Rule("disputed", _disputed, EXIT_NOT_USABLE, "measure-again"),
+    Rule("gross-errors", _gross_errors, EXIT_NOT_USABLE, "look-at-gross-errors lens take-out"),
+    Rule("too-much-removed", _too_much_removed, EXIT_NOT_USABLE, "common-of-observations"),
+    Rule("usable-after-removal", _removed, 0, "measure-again after-selection", also=True),
+    Rule("model", _model, EXIT_NOT_USABLE, "calibrate frame"),
+    Rule("too-much-set-aside", partial(_set_aside, True), EXIT_NOT_USABLE, "common-of-images"),
+    _look("set-aside", partial(_set_aside, False), "look-at-images", also=True),
+    Rule("check-points", _checks, EXIT_NOT_USABLE, "wrong-checks cause-first"),
+    _look("look-at-check-points", _suspect_checks, "look-at-checks"),
+    _look("intersection", weight_rules.intersected, "adjust-photos", grave=weight_rules.is_far),
+    Rule("weights-of-types", weight_rules.types_with_common_factor, EXIT_NOT_USABLE, "sd-of-types"),
+    Rule("weights", partial(weight_rules.common_factor, True), EXIT_NOT_USABLE, "scaled larger-sd"),
+    _look("weights", partial(weight_rules.common_factor, False), "scaled larger-sd"),
+    _look("weights-of-groups", weight_rules.components, "sd-of-groups", grave=weight_rules.has_far_groups),
+    _look("uncontrolled", _uncontrolled, "measure-more"),
+    _look("unexplained", _unexplained, "largest-tests take-out", grave=weight_rules.is_far),
+    Rule("not-accurate-enough", lambda e: e.found.shortfall, EXIT_NOT_USABLE, "more-views"),
+    _look("look-at", _look_at, "look-at", also=True),
+    Rule("weights-pessimistic", weight_rules.too_low, 0, "scaled smaller-sd"),
+    _look("accepted-not-checked", _unchecked, "check-undetected", also=True),
+    Rule("accepted", _accepted, 0),
+    Rule("not-tested", _not_tested, 0, "compare"),
 )
 """The first applicable rule defines the headline; rules that forbid the use precede all others."""

@@ -9,7 +9,6 @@ from photogram.network.observations.columns import (
     Observations,
     all_trajectories,
     moments,
-    observation_rows,
     of_records,
 )
 from photogram.network.observations.fiducial import FILM, Fiducial, KnownFilm, KnownTogether
@@ -53,6 +52,5 @@ __all__ = [
     "Velocity",
     "all_trajectories",
     "moments",
-    "observation_rows",
     "of_records",
 ]

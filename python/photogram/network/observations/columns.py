@@ -233,21 +233,3 @@ def _moments(observations: Sequence[Any]) -> Iterable[Moment]:
     if isinstance(observations, Observations):
         return filter(None, observations.column("moments"))
     return (moment for each in observations if (moment := each.moment) is not None)
-
-
-def observation_rows(
-    observations: Observations[Any],
-    points: Sequence[str],
-    photos: Sequence[str],
-    unknowns: Sequence[Unknown],
-) -> list[Group]:
-    """Return the arrays for the core of the observations of each type, in `core_order`.
-
-    Record times follow the photos. InputError if a point or photo is not in the block.
-    """
-    if not observations:
-        return []
-    all_photos = [*photos, *(each.name for each in moments(observations))]
-    of_points, of_photos = ({name: row for row, name in enumerate(each)} for each in (points, all_photos))
-    of_unknowns = {id(each): row for row, each in enumerate(unknowns)}
-    return [own.group(of_points, of_photos, of_unknowns) for own in observations.columns]

@@ -76,7 +76,7 @@ def _rule(name: str, holds: Callable[[_Evidence], bool], exit_code: int = 0) -> 
         }
         return Phrase(f"headline.{name}", fields)
 
-    return Rule(name, message, exit_code, (), grave=lambda e: e.found.strict or name != "low")
+    return Rule(name, message, exit_code, grave=lambda e: e.found.strict or name != "low")
 
 
 RULES = (
