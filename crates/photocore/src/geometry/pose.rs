@@ -17,7 +17,7 @@ pub const POSE: usize = 6;
 ///
 /// // From 1000 m straight down, the top of the picture to the north.
 /// let pose = Pose { position: Vector3::new(0.0, 0.0, 1000.0), attitude: rotation([0.0; 3]).transpose() };
-/// assert_eq!(pose.sight(&Vector3::new(10.0, 20.0, 0.0)), Vector3::new(10.0, 20.0, -1000.0));
+/// assert_eq!(pose.to_camera_frame(&Vector3::new(10.0, 20.0, 0.0)), Vector3::new(10.0, 20.0, -1000.0));
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {

@@ -40,7 +40,7 @@ pub(super) fn find_impossible_images(
     };
     let folds: Vec<f64> = photos.iter().zip(&model.blocks.of_camera).map(fold).collect();
     let (local, retained) = model.all_coordinates(unknowns);
-    let detect = |point: usize| {
+    let inspect = |point: usize| {
         let at = local.get(point).unwrap_or_else(|| &retained[point - local.len()]);
         let position = model.space.cartesian(*at);
         let (mut nearest, mut unseen) = (f64::INFINITY, ImpossibleImages::default());
@@ -62,7 +62,7 @@ pub(super) fn find_impossible_images(
         }
         (nearest, unseen.boxed())
     };
-    let of_points = parallel::map(model.points.len(), TOGETHER, detect);
+    let of_points = parallel::map(model.points.len(), TOGETHER, inspect);
     let (squares, unseen): (Vec<f64>, Vec<_>) = of_points.into_iter().unzip();
     let mut all = ImpossibleImages::default();
     for (&point, unseen) in points.iter().zip(unseen) {

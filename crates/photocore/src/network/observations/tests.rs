@@ -229,18 +229,18 @@ fn stays(observation: &Observation) -> bool {
 
 /// Returns observations of nearly all types, of fixed quantities and of shared parameters.
 fn of_kinds() -> Vec<Observation> {
-    let proportional = |sd: f64, count: usize| Precision::Deviations(vec![sd; count]);
+    let equal_precision = |sd: f64, count: usize| Precision::Deviations(vec![sd; count]);
     let two = Precision::Deviations(vec![0.01, 0.02]);
     let [attitude, boresight] = [[0.3, -0.2, 0.9], [0.02, 0.5, -0.1]].map(rotation);
     let of_attitude =
-        |boresight| Attitude { photo: 0, attitude, boresight, precision: proportional(1e-4, 3) }.into();
-    let known = Position::new(1, PLACES[0], Vector3::new(0.3, -1.2, 0.8), proportional(0.01, 3));
+        |boresight| Attitude { photo: 0, attitude, boresight, precision: equal_precision(1e-4, 3) }.into();
+    let known = Position::new(1, PLACES[0], Vector3::new(0.3, -1.2, 0.8), equal_precision(0.01, 3));
     let (shift, drift, time) = (Some(SHIFT), Some(DRIFT), -7.5);
     let in_common = Position { lever_arm: Quantity::Common(LEVER_ARM), shift, drift, time, ..known.clone() };
     let coefficients = vec![LEVER_ARM, SHIFT, DRIFT];
     let (factors, observed) = (vec![1.0, -2.0, 1.0], [0.1, 0.0, -0.2]);
     vec![
-        Control { point: 1, coordinates: PLACES[0], precision: proportional(0.01, 3) }.into(),
+        Control { point: 1, coordinates: PLACES[0], precision: equal_precision(0.01, 3) }.into(),
         distance(None),
         distance(Some(INSTRUMENT)),
         Difference { points: [1, 0], components: [Some(1.0), None, Some(-2.0)], precision: two.clone() }
@@ -262,7 +262,7 @@ fn of_kinds() -> Vec<Observation> {
         prior(vec![SENSORS[0]], vec![6]),
         prior(vec![PLANE], vec![3]),
         prior(vec![PLANE, SENSORS[0]], vec![3, 6]),
-        Smoothness { coefficients, factors, observed, precision: proportional(0.01, 3) }.into(),
+        Smoothness { coefficients, factors, observed, precision: equal_precision(0.01, 3) }.into(),
         fiducial(None, true),
         fiducial(Some(Pattern::Quadratic { half: 3.0 }), false),
         film(None, vec![3, 4, 5]),
