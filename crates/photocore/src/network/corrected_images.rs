@@ -123,17 +123,16 @@ impl Bundle {
             return;
         }
         // Number of images with equal corrections by photo, and one of them.
-        let mut proportional = vec![(0, 0); self.cameras.len()];
-        let mut corrected_images = vec![];
+        let mut uniform = vec![(0, 0); self.cameras.len()];
+        let mut individual = vec![];
         for (index, image) in self.images.iter().enumerate() {
             if self.has_uniform_corrections(image.photo) {
-                proportional[image.photo] = (proportional[image.photo].0 + 1, index);
+                uniform[image.photo] = (uniform[image.photo].0 + 1, index);
             } else {
-                corrected_images.push((1, index));
+                individual.push((1, index));
             }
         }
-        for (count, image) in proportional.into_iter().chain(corrected_images).filter(|&(count, _)| count > 0)
-        {
+        for (count, image) in uniform.into_iter().chain(individual).filter(|&(count, _)| count > 0) {
             self.correction_commons(image).into_iter().for_each(|common| self.commons[common].uses += count);
         }
     }

@@ -19,10 +19,10 @@ pub(super) fn layout(model: &Bundle, places: Vec<[f64; 3]>) -> Result<Layout, Ne
         let (mut shared_ptr, mut shared) = (Vec::with_capacity(groups + 1), Vec::with_capacity(groups));
         shared_ptr.push(0);
         let beside = |image| model.blocks_of_image(image).skip(1).map(|block| block as u32).collect();
-        let mut proportional: Vec<Option<Vec<u32>>> = vec![None; model.cameras.len()];
+        let mut of_photo: Vec<Option<Vec<u32>>> = vec![None; model.cameras.len()];
         for (index, image) in model.images[..groups].iter().enumerate() {
             if model.has_uniform_corrections(image.photo) {
-                shared.extend_from_slice(proportional[image.photo].get_or_insert_with(|| beside(index)));
+                shared.extend_from_slice(of_photo[image.photo].get_or_insert_with(|| beside(index)));
             } else {
                 shared.extend(beside(index));
             }
