@@ -55,7 +55,7 @@ class Case:
 
     def from_truth(self) -> np.ndarray:
         """Adjust from the true pose: the minimum that belongs to it."""
-        observed = Observed.checked(self.points, 0.0, self.xy, self.sd, self.principal_distance, None)
+        observed = Observed(self.points, 0.0, self.xy, self.sd, self.principal_distance, None)
         return solve(observed, start=self.truth, limit=1e-5, max_iterations=200).pose
 
 

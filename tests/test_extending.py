@@ -29,7 +29,7 @@ EXTENSIONS = {
         r"\bEquirectangular\b|\"equirectangular\"",
         [*CRATE, *BINDING, *PACKAGE],
     ),
-    "format": (FORMATS / "bundler.py", FORMATS / "registry.py", '"bundler",', r"bundler", PACKAGE),
+    "format": (FORMATS / "bundler.py", FORMATS / "__init__.py", '"bundler",', r"bundler", PACKAGE),
     # What Python can say of an observation is another matter.
     "observation": (
         KINDS / "equal_height.rs",

@@ -204,7 +204,7 @@ def test_the_danger_cylinder_is_named():
 
 def resect_from(points, station):
     """Resect with the true pose as start."""
-    observed = photogram.adjustment.resection.Observed.checked(
+    observed = photogram.adjustment.resection.Observed(
         points, 0.0, view(points, station=station), 0.01, C, None
     )
     start = np.concatenate([station, ANGLES])

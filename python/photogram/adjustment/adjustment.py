@@ -224,8 +224,24 @@ def adjusted(
 def messages_of(
     block: Block, solution: _photocore.BlockSolution, options: CoreOptions, datum: ResultDatum
 ) -> list[Message]:
-    """Return the notes of a result, without hints."""
-    messages = datum_messages(block, datum, solution.point_rays) + remarks_on(block, solution)
+    """Return the notes of a result, the most severe first, without hints."""
+    error = None if solution.undetermined is None else named(block, *solution.undetermined)
+    messages = datum_messages(block, datum, solution.point_rays) + undetermined(block, solution, error)
+    messages += rounded(solution.redundancy_excess) + harmful(block, solution)
+    messages += behind(block, solution) + folded(block, solution)
+    dropped = dropped_points(block, solution)
+    by_reason: dict[str, list[str]] = {}
+    for point, reason in dropped.items():
+        by_reason.setdefault(reason, []).append(point)
+    messages += [
+        Message(phrase("adjust.left-out", reason=phrase(f"reason.{reason}"), points=", ".join(points)))
+        for reason, points in by_reason.items()
+    ]
+    of_points = enumerate(block.observations.column("points") if dropped else [])
+    lost = [block.observations[row].name for row, of in of_points if not dropped.keys().isdisjoint(of)]
+    if lost:
+        messages.append(Message(phrase("adjust.left-out.observations", observations=lost)))
+    messages += refraction_remarks(block, solution.photo_positions)
     messages += remark(options.loss, solution.image_weights)
     iterations = [Iteration(*row) for row in solution.iterations] if options.criterion == "percent" else []
     for before, after in pairwise(iterations):
@@ -262,26 +278,6 @@ def core_threads(threads: int | None) -> int:
         fit = threads_that_fit(processors)
         return 0 if fit == processors else fit
     return threads_that_fit(min(at_least("threads", threads, 1), 4 * (os.cpu_count() or 1)))
-
-
-def remarks_on(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
-    """Collect notes on the block, the most severe first."""
-    error = None if solution.undetermined is None else named(block, *solution.undetermined)
-    messages = undetermined(block, solution, error) + rounded(solution.redundancy_excess)
-    messages += harmful(block, solution) + behind(block, solution) + folded(block, solution)
-    dropped = dropped_points(block, solution)
-    by_reason: dict[str, list[str]] = {}
-    for point, reason in dropped.items():
-        by_reason.setdefault(reason, []).append(point)
-    messages += [
-        Message(phrase("adjust.left-out", reason=phrase(f"reason.{reason}"), points=", ".join(points)))
-        for reason, points in by_reason.items()
-    ]
-    of_points = enumerate(block.observations.column("points") if dropped else [])
-    lost = [block.observations[row].name for row, of in of_points if not dropped.keys().isdisjoint(of)]
-    if lost:
-        messages.append(Message(phrase("adjust.left-out.observations", observations=lost)))
-    return messages + refraction_remarks(block, solution.photo_positions)
 
 
 def named(

@@ -228,15 +228,10 @@ def _beside_trajectories(block: Block, *, keep_all: bool) -> FirstValues:
             given = getattr(block, name) if given is None else given
             changes[f"{name}_observed"] = _with(given, ~timed, observed)
     return replace(
-        found,
+        own,
         block=block.replace(**changes),
         sources={name: sources.get(name) or own.sources[name] for name in names if name not in own.missing},
-        missing=own.missing,
-        contradicted=own.contradicted,
-        point_positions=own.point_positions,
         set_aside=_with(found.set_aside, ~timed[block.image_photos], own.set_aside),
-        contradicted_control=own.contradicted_control,
-        misfit=own.misfit,
         messages=[*own.messages, moving],
     )
 

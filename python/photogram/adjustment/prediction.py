@@ -15,6 +15,7 @@ import numpy as np
 
 from photogram.adjustment.adjustment import Progress, adjust
 from photogram.adjustment.options import Ordering
+from photogram.adjustment.remarks import named_images
 from photogram.arguments.types import Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.messages import Message
@@ -178,9 +179,7 @@ def _check_positions(block: Block) -> None:
 
     def refuse(code: str, images: Any) -> None:
         if images.any():
-            points = [block.point_ids[row] for row in np.unique(block.image_points[images])]
-            photos = [block.photo_ids[row] for row in np.unique(block.image_photos[images])]
-            raise InputError(phrase(code, points=points, photos=photos))
+            raise InputError(phrase(code, **named_images(block, images)))
 
     refuse("predict.unknown", np.isnan(block.point_positions[block.image_points]).any(axis=1))
     if block.timed:

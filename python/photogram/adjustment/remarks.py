@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from photogram import _photocore
 from photogram.adjustment.undetermined import named_unknowns, weak_in_words, weak_parameters
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError, RankError, message_of
 from photogram.messages import Message, Undetermined, listed
 from photogram.network.block import Block, position_columns
@@ -49,15 +50,12 @@ def hardly_determined(status: str, weak: str, causes: Sequence[Phrase] = ()) -> 
 
 
 def harmful(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
-    messages = []
     # Such cases are rare, and small blocks should not wait for this.
     seen = set(block.image_photos.tolist()) if solution.loose_photos else set()
-    empty = [photo for photo in solution.loose_photos if photo not in seen]
-    loose = [photo for photo in solution.loose_photos if photo in seen]
-    for kind, photos in (("empty", empty), ("loose", loose)):
-        if photos:
-            names = [block.photo_ids[photo] for photo in photos]
-            messages.append(Message(phrase(f"adjust.photos.{kind}", photos=names)))
+    by_kind: dict[str, list[str]] = {"empty": [], "loose": []}
+    for photo in solution.loose_photos:
+        by_kind["loose" if photo in seen else "empty"].append(block.photo_ids[photo])
+    messages = [Message(phrase(f"adjust.photos.{kind}", photos=own)) for kind, own in by_kind.items() if own]
     return messages + harmful_points(solution.weak_points, block.point_ids)
 
 
@@ -91,19 +89,12 @@ def _weak_figures(block: Block, solution: _photocore.BlockSolution) -> list[Phra
         others = [
             f"{camera.correlations[k, j]:+.2f} with {camera.names[j]}" for j in camera.estimated if j != k
         ]
-        fields = {"value": float(camera.values[k]), "sd": float(camera.sd[k]), "unit": unit}
-        correlated = (
-            phrase("adjust.weak.correlations", correlations=others[:MOST_CORRELATIONS]) if others else ""
-        )
-        found.append(
-            phrase(
-                "adjust.weak.parameter",
-                parameter=camera.names[k],
-                camera=camera.name,
-                correlations=correlated,
-                **fields,
-            )
-        )
+        fields: dict[str, Any] = {"parameter": camera.names[k], "camera": camera.name, "unit": unit}
+        fields |= {"value": float(camera.values[k]), "sd": float(camera.sd[k]), "correlations": ""}
+        if others:
+            correlations = others[:MOST_CORRELATIONS]
+            fields["correlations"] = phrase("adjust.weak.correlations", correlations=correlations)
+        found.append(phrase("adjust.weak.parameter", **fields))
     return found[:MOST_CORRELATIONS]
 
 
@@ -141,9 +132,13 @@ def behind(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     images = solution.images_behind
     if not len(images):
         return []
-    points = [block.point_ids[point] for point in np.unique(block.image_points[images])]
-    photos = [block.photo_ids[photo] for photo in np.unique(block.image_photos[images])]
-    return hidden(len(images), points, photos)
+    return hidden(len(images), **named_images(block, images))
+
+
+def named_images(block: Block, images: Indices | Bools) -> dict[str, list[str]]:
+    """Return the names of the points and photos of some images."""
+    points, photos = np.unique(block.image_points[images]), np.unique(block.image_photos[images])
+    return {"points": [block.point_ids[k] for k in points], "photos": [block.photo_ids[k] for k in photos]}
 
 
 def folded(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
@@ -159,14 +154,10 @@ def folded(block: Block, solution: _photocore.BlockSolution) -> list[Message]:
     lens = _fold_of(block, solution, int(images[given.argmax()]))
     if given.any():
         rows = zip(block.image_points[images[given]], block.image_photos[images[given]], strict=True)
-        names = [
-            phrase("named.image", point=block.point_ids[point], photo=block.photo_ids[photo])
-            for point, photo in rows
-        ]
+        names = [phrase("named.image", point=block.point_ids[k], photo=block.photo_ids[p]) for k, p in rows]
         raise AdjustmentError(phrase("adjust.folded.control", images=names, lens=lens))
-    points = [block.point_ids[point] for point in np.unique(block.image_points[images])]
-    photos = [block.photo_ids[photo] for photo in np.unique(block.image_photos[images])]
-    return [Message(phrase("adjust.folded.images", n=len(images), points=points, photos=photos, lens=lens))]
+    named = named_images(block, images)
+    return [Message(phrase("adjust.folded.images", n=len(images), **named, lens=lens))]
 
 
 def _fold_of(block: Block, solution: _photocore.BlockSolution, image: int) -> Phrase:
@@ -190,11 +181,8 @@ def hidden(images: int, points: list[str], photos: list[str]) -> list[Message]:
 
 def too_coarse(photos: list[str], points: list[str]) -> AdjustmentError:
     """Return the error for photos and points with coordinates too large for double precision."""
-    parts = [
-        phrase(f"adjust.list.{kind}", names=names)
-        for kind, names in (("photos", photos), ("points", points))
-        if names
-    ]
+    lists = {"photos": photos, "points": points}
+    parts = [phrase(f"adjust.list.{kind}", names=names) for kind, names in lists.items() if names]
     return AdjustmentError(phrase("adjust.coarse", parts=parts))
 
 
@@ -211,7 +199,7 @@ def check_cameras(block: Block) -> None:
         raise InputError(phrase("adjust.below-water", photo=name, unit=block.linear_unit, **height))
 
 
-def refraction_remarks(block: Block, photo_positions: NDArray[np.float64]) -> list[Message]:
+def refraction_remarks(block: Block, photo_positions: Floats) -> list[Message]:
     """Report limits of the refraction models for (P, 3) adjusted stations."""
     refraction = block.refraction
     if refraction is None or (refraction.air is None and refraction.water is None):

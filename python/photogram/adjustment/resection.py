@@ -7,7 +7,7 @@ values, the validity of the covariance, and critical configurations.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Literal, Self
 
 import numpy as np
@@ -25,9 +25,10 @@ from photogram.arguments.arrays import (
     value_field,
     whole_number,
 )
-from photogram.arguments.types import Floats
+from photogram.arguments.fields import array, check_arrays
+from photogram.arguments.types import Array, Floats, Names
 from photogram.errors import AdjustmentError, InputError, RankError
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import converting_dataclass, dataclass, field
 from photogram.messages import Message
 from photogram.network.geometry import Spheroid
 from photogram.results.parts import Iteration
@@ -142,35 +143,23 @@ class Resection(Judged):
     def _findings(self) -> Findings:
         from photogram.results.parts import parts_of
 
-        def named(code: str, row: int) -> Phrase:
-            return Phrase(code, {"point": str(self.point_ids[row])})
+        def tested(kind: str, w: Floats, redundancy: Floats, name: str, axes: Sequence[str]) -> Tested:
+            def named(index: tuple[int, ...]) -> Phrase:
+                point = {"point": str(self.point_ids[index[0]])} if w.ndim > 1 else {}
+                return parts_of([axes[index[-1]]], Phrase(name, point))
 
+            return Tested(Phrase(kind), np.where(redundancy > TESTABLE, w, np.nan), named, "w")
+
+        control = self.point_standardized, self.point_redundancy, "named.control", UNKNOWNS
+        station = self.pose_standardized, self.pose_redundancy, "named.station", UNKNOWNS
+        images = self.standardized, self.redundancy, "named.object_point", "xy"
         # Standard deviations are given, so that the unit weight is known.
-        tests: tuple[tuple[str, Floats, Floats, Callable[[tuple[int, ...]], Phrase]], ...] = (
-            (
-                "test.image_coordinates",
-                self.standardized,
-                self.redundancy,
-                lambda index: parts_of("xy"[index[1]], named("named.object_point", index[0])),
-            ),
-            (
-                "test.components_of_control",
-                self.point_standardized,
-                self.point_redundancy,
-                lambda index: parts_of([UNKNOWNS[index[1]]], named("named.control", index[0])),
-            ),
-            (
-                "test.components_of_station",
-                self.pose_standardized,
-                self.pose_redundancy,
-                lambda index: parts_of([UNKNOWNS[index[0]]], Phrase("named.station")),
-            ),
-        )
         return Findings(
             status=self.status,
             observations=[
-                Tested(Phrase(code), np.where(redundancy > TESTABLE, w, np.nan), name, "w")
-                for code, w, redundancy, name in tests
+                tested("test.image_coordinates", *images),
+                tested("test.components_of_control", *control),
+                tested("test.components_of_station", *station),
             ],
             degrees_of_freedom=self.degrees_of_freedom,
             global_test=self.global_test,
@@ -281,7 +270,7 @@ def resect(
     if spheroid is not None and not isinstance(spheroid, Spheroid):
         raise argument_error("spheroid", "kind", kind="a Spheroid or None", value=spheroid)
     truth_value("photo_to_ground", photo_to_ground)
-    given = Observed.checked(object_points, object_sd, image_xy, image_sd, principal_distance, point_ids)
+    given = Observed(object_points, object_sd, image_xy, image_sd, principal_distance, point_ids)
     known = np.concatenate(
         [_known("position", position, position_sd), _known("attitude", attitude, attitude_sd)]
     )
@@ -310,8 +299,8 @@ def resect(
             solution.pose_redundancy,
         ),
         point_standardized=standardized(
-            _nearest(given.points - solution.point_positions, [0] if spheroid else []),
-            given.point_sd,
+            _nearest(given.object_points - solution.point_positions, [0] if spheroid else []),
+            given.object_sd,
             solution.point_redundancy,
         ),
         point_ids=given.names,
@@ -329,48 +318,32 @@ def _nearest(differences: Floats, angles: list[int]) -> Floats:
     return nearest
 
 
-@dataclass(frozen=True, eq=False)
+@converting_dataclass(frozen=True, eq=False, repr=False)
 class Observed:
-    """Input of a resection: control (n, 3), images (n, 2), standard deviations and n names."""
+    """Input of a resection: n control points, their images, standard deviations and names."""
 
-    points: Floats
-    point_sd: Floats
-    xy: Floats
-    xy_sd: Floats
+    object_points: Array = field(metadata=array("points", 3))
+    object_sd: Array = field(metadata=array("points", 3, rule="sd", one_row=True))
+    image_xy: Array = field(metadata=array("points", 2))
+    image_sd: Array = field(metadata=array("points", 2, rule="sd", one_row=True))
     principal_distance: float
-    names: list[str]
+    names: Names
 
-    @classmethod
-    def checked(
-        cls,
-        points: ArrayLike,
-        point_sd: ArrayLike,
-        xy: ArrayLike,
-        xy_sd: ArrayLike,
-        principal_distance: float,
-        point_ids: Sequence[str] | None,
-    ) -> Self:
-        """Return the validated input; InputError for wrong shapes or values."""
-        count = length("image_xy", xy)
-        ids = [str(i + 1) for i in range(count)] if point_ids is None else names("point_ids", point_ids)
+    def __post_init__(self) -> None:
+        count, given = length("image_xy", self.image_xy), self.names
+        ids = [str(i + 1) for i in range(count)] if given is None else names("point_ids", given)
         if len(ids) != count:
             raise argument_error("point_ids", "count", count=count, actual=len(ids))
-        made = cls(
-            points=shaped("object_points", points, (count, 3)),
-            point_sd=shaped("object_sd", point_sd, (count, 3), "sd", one_row=True),
-            xy=shaped("image_xy", xy, (count, 2)),
-            xy_sd=shaped("image_sd", xy_sd, (count, 2), "sd", one_row=True),
-            principal_distance=number("principal_distance", principal_distance, "not-zero"),
-            names=ids,
-        )
-        checks = {"object_points": made.points, "object_sd": made.point_sd, "image_xy": made.xy}
-        for name, values in {**checks, "image_sd": made.xy_sd}.items():
+        check_arrays(self, points=count)
+        distance = number("principal_distance", self.principal_distance, "not-zero")
+        vars(self).update(principal_distance=distance, names=ids)
+        for name in ("object_points", "object_sd", "image_xy", "image_sd"):
+            values = getattr(self, name)
             good = np.isfinite(values) & ((values > 0) | (name != "image_sd"))
             if (rows := np.flatnonzero(~good.all(axis=1))).size:
                 code = "positive" if name == "image_sd" else "finite"
                 value = value_field(values[rows[0]].tolist())
                 raise argument_error(f"{name} of point {ids[rows[0]]}", code, value=value)
-        return made
 
 
 def solve(
@@ -392,10 +365,10 @@ def solve(
     """
     try:
         return _photocore.resect(
-            observed.points,
-            observed.point_sd,
-            observed.xy,
-            observed.xy_sd,
+            observed.object_points,
+            observed.object_sd,
+            observed.image_xy,
+            observed.image_sd,
             observed.principal_distance,
             known=np.full(6, np.nan) if known is None else known,
             known_sd=np.full(6, np.inf) if known_sd is None else known_sd,

@@ -197,7 +197,12 @@ def snoop_block(
     cleaned = _without(block, trial, outcome.out)
     near = replace(core, points_given=True)
     result = adjusted(started(cleaned), near, threads=threads, progress=progress)
-    exchanged = _exchanged(block, trial, outcome, result)
+    reached = block.replace(
+        photo_positions=result.photo_positions,
+        photo_attitudes=result.photo_attitudes,
+        cameras=[each.camera for each in result.cameras] or result.block.cameras,
+    )
+    exchanged = exchanged_names(reached, used_images(trial, outcome.out, len(block.image_xy)))
     if isinstance(datum, InnerConstraints) and result.converged:
         # Points without given coordinates define the datum at their first intersection.
         poses = {"photo_positions": block.photo_positions, "photo_attitudes": block.photo_attitudes}
@@ -233,16 +238,6 @@ def finished(
         exchanged=tuple(exchanged),
     )
     return recorded(found)
-
-
-def _exchanged(block: Block, trial: NetworkTrial, outcome: Outcome, result: Result) -> list[Exchange]:
-    """Detect swapped names among the removed observations."""
-    reached = block.replace(
-        photo_positions=result.photo_positions,
-        photo_attitudes=result.photo_attitudes,
-        cameras=result.block.cameras if not result.cameras else [each.camera for each in result.cameras],
-    )
-    return exchanged_names(reached, used_images(trial, outcome.out, len(block.image_xy)))
 
 
 def gone(trial: NetworkTrial, out: Out, kind: int) -> tuple[Indices, Indices]:

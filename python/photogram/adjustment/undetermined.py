@@ -108,24 +108,23 @@ def undetermined_combinations(
     points = np.unique(block.image_points[np.isin(block.image_photos, concerned)])
     point_names = [block.point_ids[point] for point in points]
     distinct, at = sorted(set(rows)), setting_of(block)
-    causes = [_cause(block, combination, at, common) for combination in distinct]
-    moving = [
-        _moved(block, of, by, named_unknowns(block, [common[row] for row in others]))
-        for of, by, others, *_ in distinct
-    ]
-    lines: list[str] = []
-    for combination, cause, moved in zip(distinct, causes, moving, strict=True):
+    lines, causes, whats = list[str](), list[Phrase | None](), dict[str, None]()
+    for combination in distinct:
+        of, by, others, *_ = combination
+        cause = _cause(block, combination, at, common)
+        moved = _moved(block, of, by, named_unknowns(block, [common[row] for row in others]))
         lines.append(f"  {rows.count(combination)}: {moved}")
         lines += [f"    {cause}"] if cause else []
+        causes.append(cause)
+        whats[str(cause or moved)] = None
     if len(lines) >= MOST:
         lines = [*lines[: MOST - 1], f"  ... ({len(lines) - MOST + 1})"]
     if not np.isfinite(block.point_sd).any() and not any(causes):
         weighted = bool(np.isfinite(block.photo_position_sd).any())
         remedy = "large-sd" if weighted else "trajectories" if flown_by(block) else "photos"
         lines.append(f"  {phrase(f'adjust.no-datum.{remedy}')}")
-    what = "; ".join(dict.fromkeys(str(cause or moved) for cause, moved in zip(causes, moving, strict=True)))
     message = phrase("adjust.undetermined", n=len(rows), lines="\n".join(["", *lines]))
-    return RankError(message, names, point_names, camera_names, what)
+    return RankError(message, names, point_names, camera_names, "; ".join(whats))
 
 
 def _moved(block: Block, photos: tuple[int, ...], cameras: tuple[int, ...], unknowns: list[str]) -> Phrase:
@@ -168,8 +167,12 @@ def _cause(block: Block, combination: _Combination, at: Setting, common: Sequenc
 
 def _of_unknowns(block: Block, kinds: set[str], photos: int, at: Setting) -> Phrase | None:
     """Return the cause if shifts, drifts, motions or collinear control leave unknowns free."""
-    if cause := of_motion(kinds, placed=at.control or bool(block.observations)):
-        return cause
+    coefficients = kinds & {"position coefficient", "rotation coefficient"}
+    if coefficients and kinds & {"readout", "clock"}:
+        return phrase("weak.readout" if "readout" in kinds else "weak.clock")
+    # Control or additional observations may determine the datum.
+    if coefficients and coefficients == kinds and (at.control or block.observations):
+        return phrase("weak.motion" if len(coefficients) == 2 else "weak.coefficients")
     if kinds == {"lever arm", "shift"}:
         return phrase("weak.lever-arm")
     if "drift" in kinds:
@@ -213,7 +216,8 @@ def weak_in_words(block: Block, solution: _photocore.BlockSolution) -> Phrase | 
         for name, sd in zip(each.names, each.deviations, strict=True)
         if np.isinf(sd) and name in _OF_RING
     }
-    return _of_setting(names | free, at) or in_words(names, poses, at) or _of_distances(names, poses)
+    depths = phrase("weak.depths") if names <= _DISTANCES and poses else None
+    return _of_setting(names | free, at) or in_words(names, poses, at) or depths
 
 
 def in_words(names: set[str], poses: set[str], setting: Setting | None = None) -> Phrase | None:
@@ -238,10 +242,6 @@ def in_words(names: set[str], poses: set[str], setting: Setting | None = None) -
         "weak.shear": names == {"b2"} and "swing" in poses,
     }
     return next((phrase(code) for code, holds in cases.items() if holds), None)
-
-
-def _of_distances(names: set[str], poses: set[str]) -> Phrase | None:
-    return phrase("weak.depths") if names and names <= _DISTANCES and poses else None
 
 
 def _of_setting(names: set[str], at: Setting) -> Phrase | None:
@@ -303,18 +303,3 @@ def beyond_trajectory(block: Block, photo: int, points: Sequence[int], seconds: 
     time, first, last = (trajectory.origin + second for second in seconds)
     fields = {"subject": subject, "trajectory": trajectory.name, "time": time, "first": first, "last": last}
     return phrase("adjust.beyond-trajectory", **fields)
-
-
-def of_motion(kinds: set[str], *, placed: bool) -> Phrase | None:
-    """Return why unknowns of motion cannot be separated.
-
-    `placed`: control or additional observations exist, so that the datum may be determined.
-    """
-    coefficients = kinds & {"position coefficient", "rotation coefficient"}
-    if "readout" in kinds and coefficients:
-        return phrase("weak.readout")
-    if "clock" in kinds and coefficients:
-        return phrase("weak.clock")
-    if not placed or not coefficients or coefficients != kinds:
-        return None
-    return phrase("weak.motion" if len(coefficients) == 2 else "weak.coefficients")

@@ -76,9 +76,7 @@ def simulate(
         raise InputError(phrase("collection.few-photos", photos=2, rays=2, given=[photos, points]))
     if not (0 <= seen <= 1 and 0 <= outlier_share <= 1):
         raise InputError(phrase("collection.share", given=[seen, outlier_share]))
-    if not (noise >= 0 and outlier_size >= 0 and seed >= 0):
-        fields = {"names": ["noise", "outlier_size", "seed"], "given": [noise, outlier_size, seed]}
-        raise InputError(phrase("collection.negative", **fields))
+    _not_negative(noise=noise, outlier_size=outlier_size, seed=seed)
     random = np.random.default_rng(seed)
     parameters = _cameras(photos, random)
     positions = random.uniform(-SIZE / 2, SIZE / 2, (points, 3))
@@ -141,9 +139,7 @@ def simulate_turntable(
     """
     if photos < 2 or points < 1 or not 2 <= rays <= photos:
         raise InputError(phrase("collection.few-photos", photos=2, rays=2, given=[photos, points, rays]))
-    if not (noise >= 0 and coarseness >= 0 and seed >= 0):
-        fields = {"names": ["noise", "coarseness", "seed"], "given": [noise, coarseness, seed]}
-        raise InputError(phrase("collection.negative", **fields))
+    _not_negative(noise=noise, coarseness=coarseness, seed=seed)
     if not distance > 2:
         raise InputError(phrase("collection.distance", value=distance))
     random = np.random.default_rng(seed)
@@ -168,6 +164,11 @@ def simulate_turntable(
     return Simulation(
         truth.replace(photo_parameters=start, point_positions=coarse), truth, np.zeros(len(exact), dtype=bool)
     )
+
+
+def _not_negative(**given: float) -> None:
+    if not all(value >= 0 for value in given.values()):
+        raise InputError(phrase("collection.negative", names=list(given), given=list(given.values())))
 
 
 def _cameras(photos: int, random: np.random.Generator) -> Floats:

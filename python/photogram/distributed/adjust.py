@@ -26,13 +26,12 @@ from photogram.adjustment.options import AdjustOptions
 from photogram.adjustment.remarks import check_cameras
 from photogram.arguments.fields import options_of
 from photogram.distributed.cut import UNKNOWNS, Counts, alone_of, counted_work, incidence_of, vertices_of
-from photogram.distributed.datum import nodes_in_datum
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Driver, Outcome
 from photogram.distributed.executors import Executor, Serial, Workers, check_workers, connected
 from photogram.distributed.files import alone
 from photogram.distributed.merging import merged
-from photogram.distributed.nodes import CoreEngine
+from photogram.distributed.nodes import CoreEngine, nodes_in_datum
 from photogram.distributed.parts import IN_TABLES
 from photogram.distributed.plan import SHARE, PartsPlan, measured_rates
 from photogram.distributed.run import MANIFEST, Manifest, partition, places_of, read_manifest

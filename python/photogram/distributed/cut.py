@@ -23,6 +23,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, flown_by
 from photogram.network.films import Scan
 from photogram.network.observations import Observation
+from photogram.network.unknowns import Unknown
 
 UNKNOWNS = 6  # Unknowns of the pose of a photo
 SMALLEST = 8  # Minimum number of photos of a front
@@ -341,13 +342,12 @@ def photos_of_unknowns(block: Block) -> dict[int, str]:
     of several photos remain shared unknowns. The same applies to all films if there are photos on frames
     (halves of joined scans) or trajectories.
     """
-    found: dict[int, set[str]] = {}
-    for each in () if block.mounts or flown_by(block) else block.passages:
-        if isinstance(each, Scan):
-            for own in (each.film.placement, each.film.size, each.film.bend):
-                found.setdefault(id(own), set()).add(each.photo)
-    found.pop(id(None), None)
-    alone = {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
+    alone = _of_one_photo(
+        (own, each.photo)
+        for each in (() if block.mounts or flown_by(block) else block.passages)
+        if isinstance(each, Scan)
+        for own in (each.film.placement, each.film.size, each.film.bend)
+    )
     for timed, trajectory in zip(block.timed, block.trajectories, strict=True):
         for part in trajectory.coefficients:
             for coefficient in part:
@@ -360,13 +360,21 @@ def alone_of(block: Block) -> dict[int, str]:
 
     A reseau node is a separate block that images in its cells touch; it belongs to its photo.
     """
+    return photos_of_unknowns(block) | _of_one_photo(
+        (own, each.photo)
+        for each in block.passages
+        if isinstance(each, Scan) and each.film.pattern is not None
+        for own in each.film.pattern.weights
+    )
+
+
+def _of_one_photo(pairs: Iterable[tuple[Unknown | None, str]]) -> dict[int, str]:
+    """Return the photos of unknowns with one photo, by object identity."""
     found: dict[int, set[str]] = {}
-    for each in block.passages:
-        if isinstance(each, Scan) and each.film.pattern is not None:
-            for own in each.film.pattern.weights:
-                found.setdefault(id(own), set()).add(each.photo)
-    alone = {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
-    return photos_of_unknowns(block) | alone
+    for own, photo in pairs:
+        if own is not None:
+            found.setdefault(id(own), set()).add(photo)
+    return {own: photos.pop() for own, photos in found.items() if len(photos) == 1}
 
 
 def photos_of(observation: Observation, alone: Mapping[int, str]) -> list[str]:

@@ -17,11 +17,11 @@ from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
 from photogram.arguments.types import Floats
 from photogram.distributed.cut import Tree
-from photogram.distributed.datum import InDatum
 from photogram.distributed.executors import Executor, Handle
 from photogram.distributed.run import Course
 from photogram.distributed.tasks import (
     Chord,
+    InDatum,
     Job,
     Point,
     counted,

@@ -1,7 +1,8 @@
-"""Nodes of a block in the core: creation from parts on disk, and storage of results."""
+"""Nodes of a block in the core: creation from parts on disk, storage of results, and their datum."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, cast
 
@@ -9,16 +10,17 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.adjustment.adjustment import named
-from photogram.arguments.types import Indices
-from photogram.distributed.datum import local_row
+from photogram.arguments.types import Floats, Indices
 from photogram.distributed.files import read_json, write_file, write_json
 from photogram.distributed.parts import Names, Part
-from photogram.distributed.run import read_manifest, read_node, result_folder
+from photogram.distributed.run import Manifest, read_manifest, read_node, result_folder
 from photogram.io.structure import Decoder, Encoder
 from photogram.lazy_dataclasses import replace
+from photogram.network.block import Block
 from photogram.network.core_arrays import block_network
+from photogram.network.datum import DatumRow
 from photogram.results.block_files import block_files, read_block_result
-from photogram.results.datum import datum_of
+from photogram.results.datum import datum_of, refused
 from photogram.results.result import Result
 from photogram.results.result_files import read_summary
 
@@ -157,3 +159,44 @@ class _Scaled:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._solution, name)
+
+
+def nodes_in_datum(
+    block: Block, manifest: Manifest, nodes: Sequence[tuple[Indices, Floats]]
+) -> list[dict[str, np.ndarray]]:
+    """Transform an adjusted block to inner constraints: values (N,) and names (N, 3) of its nodes.
+
+    Names are of the unknowns in the whole block. Return for each node the new `values` (N,) and the columns
+    `b` and `t` (d, N). Also return the `condition`, a measure of rounding errors, and the unknowns `staying`
+    in the datum. InputError if points and photos do not define the datum; others as in
+    :func:`photogram.adjust`.
+    """
+    assert manifest.datum is not None
+    names, values = (np.concatenate(each) for each in zip(*nodes, strict=True))
+    network, middle = block_network(block, manifest.options), manifest.middle
+    try:
+        moved, *columns, condition, exact = network.parts_in_datum(
+            manifest.datum, manifest.held, middle=middle, names=names.ravel(), values=values, threads=0
+        )
+    except _photocore.BlockError as error:
+        raise refused(block, network, None, error) from None
+    b, t = (each.reshape(-1, len(values)) for each in columns)
+    found, start = [], 0
+    for _, own in nodes:
+        rows = slice(start, start + len(own))
+        start += len(own)
+        staying = np.flatnonzero(b[:, rows].any(axis=0)) if exact else np.zeros(0, dtype=np.int64)
+        arrays = {"values": moved[rows], "b": b[:, rows], "t": t[:, rows]}
+        found.append({**arrays, "condition": np.array(condition), "staying": staying})
+    return found
+
+
+def local_row(row: DatumRow, photos: Indices, points: Indices) -> DatumRow:
+    """Restrict a datum to the photos and points of a node."""
+    name, of_points, of_photos, scale, attitudes, radius = row
+
+    def own(rows: Indices, chosen: list[int]) -> list[int]:
+        found: list[int] = np.flatnonzero(np.isin(rows, chosen)).tolist()
+        return found
+
+    return name, own(points, of_points), own(photos, of_photos), scale, own(photos, attitudes), radius

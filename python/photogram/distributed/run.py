@@ -168,8 +168,8 @@ def divided(
     x, y, z = np.median(block.photo_positions, axis=0).tolist()
     of_nodes: Any = map(list, zip(*counts, strict=True))
     names = ("weighted", "photos", "points", "images")
-    shared = dict(zip(names, of_nodes, strict=True)) | {"seals": seals, "held": held, "datum": datum}
-    manifest = Manifest(_photocore.__version__, source, tree, outer, (x, y, z), options, **shared)
+    facts = dict(zip(names, of_nodes, strict=True)) | {"seals": seals, "held": held, "datum": datum}
+    manifest = Manifest(_photocore.__version__, source, tree, outer, (x, y, z), options, **facts)
     # This file completes a partition.
     document = {name: getattr(manifest, name) for name in _PLAIN}
     document["parts"] = (len(manifest.tree) + 1) // 2

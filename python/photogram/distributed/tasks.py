@@ -18,7 +18,6 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.distributed.datum import LANES, InDatum
 from photogram.distributed.files import read_arrays, write_arrays
 from photogram.distributed.shelf import shelf
 from photogram.errors import InputError
@@ -31,6 +30,7 @@ if TYPE_CHECKING:
     from photogram.distributed.nodes import CoreEngine
 
 GIVEN = "0"  # Initial state, defined by the nodes
+LANES = 8  # Right-hand sides of points that the core reduces at a time
 
 
 @dataclass(frozen=True)
@@ -99,6 +99,18 @@ class Chord:
 
     left: Floats
     decrease: float
+
+
+@dataclass(frozen=True)
+class InDatum:
+    """Data for the inversion of nodes after the transformation to a datum.
+
+    `common` (d, d) is the sum B^T Q B of the whole block. `last` names the states before and after the last
+    step, which precedes the transformation.
+    """
+
+    common: Floats
+    last: tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,19 @@ import numpy as np
 from photogram.adjustment.adjustment import Progress
 from photogram.arguments.types import Floats
 from photogram.distributed.cut import Tree
-from photogram.distributed.datum import InDatum
 from photogram.distributed.executors import Executor, Handle
-from photogram.distributed.tasks import Formed, Job, Lost, Point, about, formed, inverted, lost, state_path
+from photogram.distributed.tasks import (
+    Formed,
+    InDatum,
+    Job,
+    Lost,
+    Point,
+    about,
+    formed,
+    inverted,
+    lost,
+    state_path,
+)
 from photogram.errors import AdjustmentError, PhotogramError
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.parts import Iteration

@@ -11,6 +11,7 @@ import numpy as np
 from photogram.arguments.arrays import (
     RULES,
     argument_error,
+    elements,
     frozen,
     indices,
     length,
@@ -22,7 +23,7 @@ from photogram.arguments.types import Bools
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import fields
 from photogram.network.films import check_scans
-from photogram.network.moving_photos import checked_timed, own_trajectories
+from photogram.network.moving_photos import Timed, require_photos, trajectory_of
 from photogram.network.observations import Rate, Velocity
 from photogram.network.observations.observation import checked_observations
 from photogram.network.observations.unknowns import with_knots, with_smoothness
@@ -175,14 +176,15 @@ def _check_free_poses(block: Block, photos: list[str], rule: str) -> None:
 
 
 def _check_timed(block: Block) -> None:
-    block._set("timed", checked_timed(block.timed, block.photo_ids))
+    block._set("timed", elements("timed", block.timed, Timed))
+    require_photos("timed", [each.photo for each in block.timed], block.photo_ids)
     own = [each.photo for each in block.timed if each.trajectory is None]
     if own:
         poses = np.hstack([block.photo_positions, block.photo_attitudes])
         unknown = np.isnan(poses).any(axis=1) & np.isin(block.photo_ids, own)
         for row in np.flatnonzero(unknown).tolist():
             raise InputError(phrase("block.moving-pose-unknown", photo=block.photo_ids[row]))
-    block._set("_trajectories", own_trajectories(block))
+    block._set("_trajectories", [trajectory_of(block, each) for each in block.timed])
     on_frames = {name for mount in block.mounts for name in (mount.photo, mount.frame)}
     if both := [each.photo for each in block.timed if each.photo in on_frames]:
         raise InputError(phrase("block.timed-and-mounted", photo=both[0]))

@@ -25,21 +25,12 @@ MOST = 10_000  # Maximum number of knots along columns or rows
 class Knot(Numbers):
     """Unknown displacements dx, dy at a camera knot, in units of the stereographic image.
 
-    Parameters
-    ----------
-    name
-        Names of the camera and the knot.
-    value
-        (2,) initial values.
-    sd
-        (2,) 0 (fixed), or infinite (free or weighted by `covariance`).
-    covariance
-        (2, 2) covariance of the observation that both are 0; None without the observation.
+    Standard deviations are 0 (fixed), or infinite (free or weighted by `covariance`).
     """
 
     KIND = "knot"
 
-    covariance: Floats | None = None
+    covariance: Floats | None = None  # (2, 2) of the observation that both are 0; None without it
 
 
 @dataclass(frozen=True, eq=False)

@@ -54,29 +54,26 @@ class Lens:
     def __post_init__(self) -> None:
         one_of("model of a lens", self.model, get_args(LensModel))
         own = np.atleast_1d(numbers(f"coefficients of the lens {self.model}", self.coefficients))
-        count = _FORMULAS[self.model].count
-        good, where = (
-            own.shape == (count,) and np.isfinite(own).all(),
-            f"coefficients of the lens {self.model}",
+        count, *_ = _FORMULAS[self.model]
+        good = own.shape == (count,) and np.isfinite(own).all()
+        require(
+            good, f"coefficients of the lens {self.model}", "numbers", count=count, value=self.coefficients
         )
-        require(good, where, "numbers", count=count, value=self.coefficients)
         object.__setattr__(self, "coefficients", tuple(own.tolist()))
         usable = np.isfinite(number("focal_length", self.focal_length)) and self.focal_length != 0
         require(usable, f"focal_length of the lens {self.model}", "positive", value=self.focal_length)
 
     def corrected(self, places: Floats) -> Floats:
         """Convert (n, 2) measured positions to positions of a perfect lens; millimetres, y up."""
-        formula = _FORMULAS[self.model]
-        return self._inverse(places) if formula.forward else self._formula(places)
+        return self._inverse(places) if _FORMULAS[self.model][1] else self._formula(places)
 
     def distorted(self, places: Floats) -> Floats:
         """Convert (n, 2) positions of a perfect lens to measured positions; millimetres, y up."""
-        formula = _FORMULAS[self.model]
-        return self._formula(places) if formula.forward else self._inverse(places)
+        return self._formula(places) if _FORMULAS[self.model][1] else self._inverse(places)
 
     def _formula(self, places: Floats) -> Floats:
         x, y = places[:, 0], -places[:, 1]
-        found = _FORMULAS[self.model].of(x, y, self.coefficients, self.focal_length)
+        found = _FORMULAS[self.model][2](x, y, self.coefficients, self.focal_length)
         return np.column_stack([found[0], -found[1]])
 
     def _inverse(self, places: Floats) -> Floats:
@@ -99,13 +96,6 @@ class Lens:
             if not (np.abs(step) > CLOSE * size).any():
                 break
         return found
-
-
-@dataclass(frozen=True)
-class _Formula:
-    count: int
-    forward: bool
-    of: Callable[[Floats, Floats, Sequence[float], float], tuple[Floats, Floats]]
 
 
 def _radial(x: Floats, y: Floats, k: Sequence[float], _: float) -> tuple[Floats, Floats]:
@@ -147,11 +137,12 @@ def _radtan(x: Floats, y: Floats, k: Sequence[float], f: float) -> tuple[Floats,
     return f * own_x, f * own_y
 
 
-_FORMULAS = {
-    "radial": _Formula(3, False, _radial),
-    "transverse": _Formula(20, True, _transverse),
-    "lrolrocnac": _Formula(1, False, _lrolrocnac),
-    "kaguyalism": _Formula(10, False, _kaguyalism),
-    "cahvor": _Formula(5, False, _cahvor),
-    "radtan": _Formula(5, True, _radtan),
-}
+_Formula = Callable[[Floats, Floats, Sequence[float], float], tuple[Floats, Floats]]
+_FORMULAS: dict[str, tuple[int, bool, _Formula]] = {
+    "radial": (3, False, _radial),
+    "transverse": (20, True, _transverse),
+    "lrolrocnac": (1, False, _lrolrocnac),
+    "kaguyalism": (10, False, _kaguyalism),
+    "cahvor": (5, False, _cahvor),
+    "radtan": (5, True, _radtan),
+}  # Number of coefficients, whether the model is forward, formula

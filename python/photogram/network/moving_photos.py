@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, elements, number, numbers, object_name, shaped
+from photogram.arguments.arrays import argument_error, number, numbers, object_name, shaped
 from photogram.arguments.equality import Valued
 from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import kind_error, require
@@ -309,13 +309,6 @@ class Timed:
         return time, np.zeros(len(xy)) if self.shutter is None else self.shutter.times(xy), xy
 
 
-def checked_timed(timed: object, photos: Sequence[str]) -> tuple[Timed, ...]:
-    """Return validated timed photos without repetition."""
-    checked = elements("timed", timed, Timed)
-    require_photos("timed", [each.photo for each in checked], photos)
-    return checked
-
-
 def require_photos(name: str, own: Sequence[str], photos: Sequence[str]) -> None:
     """Reject repeated photos and photos that are not in the block."""
     known, seen = set(photos), set[str]()
@@ -326,16 +319,11 @@ def require_photos(name: str, own: Sequence[str], photos: Sequence[str]) -> None
         seen.add(photo)
 
 
-def own_trajectories(block: Block) -> list[Trajectory]:
-    """Return the trajectory of each timed photo: the given one, or uniform motion."""
-    return [
-        _uniform(block, each, block._photo_rows[each.photo]) if each.trajectory is None else each.trajectory
-        for each in block.timed
-    ]
-
-
-def _uniform(block: Block, own: Timed, row: int) -> Trajectory:
-    """Return uniform motion c_0 + (t - t_e) v and r_0 + (t - t_e) w from the pose of a photo."""
+def trajectory_of(block: Block, own: Timed) -> Trajectory:
+    """Return the given trajectory, or uniform motion from the pose: c_0 + (t - t_e) v, r_0 + (t - t_e) w."""
+    if own.trajectory is not None:
+        return own.trajectory
+    row = block._photo_rows[own.photo]
     if block.geographic:
         raise InputError(phrase("block.timed.geographic", photo=own.photo))
     sd_position, sd_attitude = block.photo_position_sd[row], block.photo_attitude_sd[row]

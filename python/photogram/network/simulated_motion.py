@@ -10,9 +10,9 @@ import math
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.network import geometry
-from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.moving_photos import Direction, Shutter, Timed
 from photogram.network.observations import Attitude
@@ -27,11 +27,6 @@ _STARTS = 0.5  # Initial value of an unknown readout time, relative to the true 
 def photo_angles(axes: Floats, photo_to_ground: bool) -> Floats:
     """Return (P, 3) omega, phi, kappa of photos with (P, 3, 3) axes as columns."""
     return geometry.rotation_angles(axes if photo_to_ground else axes.transpose(0, 2, 1))
-
-
-def rotations_of(vectors: Floats) -> Floats:
-    """Return (n, 3, 3) the rotations by (n, 3) rotation vectors."""
-    return Attitudes.of("rotation_vector", vectors).matrices
 
 
 def rolled(
@@ -86,17 +81,14 @@ def _with_attitudes(block: Block, truth: Block, draw: Floats) -> Block:
     sd = truth.photo_attitude_sd
     if not ((sd > 0) & np.isfinite(sd)).any():
         return block
-    observed = geometry.photo_axes(truth.photo_attitudes, truth.photo_to_ground) @ rotations_of(sd * draw)
+    axes, turns = geometry.photo_axes(truth.photo_attitudes, truth.photo_to_ground), sd * draw
+    observed = Attitude.from_arrays(
+        photo=truth.photo_ids, attitude=axes @ _photocore.vector_rotations(turns), sd=sd
+    )
     return block.replace(
         photo_attitude_sd=np.inf,
         photo_attitudes_observed=None,
-        observations=[
-            *block.observations,
-            *(
-                Attitude(name, matrix, sd=own)
-                for name, matrix, own in zip(truth.photo_ids, observed, sd, strict=True)
-            ),
-        ],
+        observations=[block.observations, observed],
     )
 
 

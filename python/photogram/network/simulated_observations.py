@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram import _photocore
 from photogram.arguments.arrays import argument_error, number, shaped, truth_value, whole_number
 from photogram.arguments.objects import require
 from photogram.arguments.types import Floats, Indices
@@ -23,7 +24,7 @@ from photogram.network.block import Block
 from photogram.network.geometry import Cartesian, photo_axes
 from photogram.network.observations import Attitude, Distance, Observation, Observations, Position
 from photogram.network.rigs import Mount
-from photogram.network.simulated_motion import photo_angles, rotations_of
+from photogram.network.simulated_motion import photo_angles
 from photogram.network.simulation import Simulation
 from photogram.network.unknowns import Boresight, Drift, Instrument, LeverArm, Sensor, Shift
 from photogram.words import phrase
@@ -132,9 +133,9 @@ def with_inertial(
     """
     _positive(sd=sd)
     random, truth = np.random.default_rng(seed), simulation.truth
-    turn = rotations_of(shaped("boresight", boresight, (3,))[np.newaxis])[0]
+    turn = _photocore.vector_rotations(shaped("boresight", boresight, (3,))[np.newaxis])[0]
     local = photo_axes(truth.photo_attitudes, truth.photo_to_ground) @ turn
-    errors = rotations_of(sd * random.standard_normal((len(local), 3)))
+    errors = _photocore.vector_rotations(sd * random.standard_normal((len(local), 3)))
     known, unknown = Boresight("inertial unit", turn, 0.0), Boresight("inertial unit")
     exact, noisy = (
         Attitude.from_arrays(photo=truth.photo_ids, attitude=matrices, sd=sd, boresight=own)
@@ -244,8 +245,8 @@ def with_rig(
     axes, (centres, turned) = Cartesian(truth.spheroid), _poses(truth)
     mounts: tuple[list[Mount], list[Mount]] = ([], [])
     added: list[tuple[Floats, Floats, Indices, Indices, Floats]] = []
-    for k, (offset, turn) in enumerate(zip(offsets, rotations_of(turns), strict=True)):
-        start = rotations_of(rotation_error * random.standard_normal((1, 3)))[0]
+    for k, (offset, turn) in enumerate(zip(offsets, _photocore.vector_rotations(turns), strict=True)):
+        start = _photocore.vector_rotations(rotation_error * random.standard_normal((1, 3)))[0]
         sensors = (
             Sensor(f"sensor {k + 2}", offset, turn, 0.0),
             Sensor(f"sensor {k + 2}", offset + position_error * random.standard_normal(3), turn @ start),

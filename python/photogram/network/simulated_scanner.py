@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera
 from photogram.network.motion import about, given_poses
 from photogram.network.moving_photos import Lines, LineSensor, Timed
-from photogram.network.observations import Attitude, Observation, Position
+from photogram.network.observations import Attitude, Observations, Position
 from photogram.network.projecting import projected, standing
 from photogram.network.simulated_images import Taken
 from photogram.network.simulated_layout import Layout, grid, photo_ids, window
-from photogram.network.simulated_motion import photo_angles, rotations_of
+from photogram.network.simulated_motion import photo_angles
 from photogram.network.simulation_options import LineScanner, SimulationOptions
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
 
@@ -26,35 +28,6 @@ _BEYOND = 2  # Lines before the first and after the last one within reach of tra
 _SURE = 5.0
 """Maximum measurement error in standard deviations. At low ground speed, an error in the focal plane equals
 many lines."""
-
-
-@dataclass(frozen=True)
-class _Flight:
-    """Flight of a scanner."""
-
-    scanner: LineScanner
-    options: SimulationOptions
-
-    @property
-    def line(self) -> float:
-        """Seconds between lines, for equal ground distances of lines and samples."""
-        c = abs(self.options.principal_distance)
-        return self.scanner.pitch * self.options.flying_height / c / self.scanner.speed
-
-    @property
-    def ahead(self) -> float:
-        """Maximum ground distance ahead of the camera in view of a line, metres."""
-        return self.options.flying_height * math.tan(max(self.scanner.views.values()))
-
-    def sensors(self) -> dict[str, LineSensor]:
-        """Return the sensor lines by name, each with the length of the frame."""
-        pitch = self.scanner.pitch
-        middle = round(self.options.frame_size / pitch) / 2
-        distance = -self.options.principal_distance
-        return {
-            name: LineSensor((pitch, 0.0), middle, y0=distance * math.tan(angle))
-            for name, angle in self.scanner.views.items()
-        }
 
 
 @dataclass(frozen=True)
@@ -82,19 +55,24 @@ def scanned(
     random: np.random.Generator,
 ) -> Taken:
     """Scan (n, 3) grid points of a layout in the object space with a line scanner."""
-    flown = _Flight(scanner, options)
-    sensors = flown.sensors()
+    pitch, distance = scanner.pitch, options.principal_distance
+    # Seconds between lines, for equal ground distances of lines and samples
+    line = pitch * options.flying_height / abs(distance) / scanner.speed
+    middle = round(options.frame_size / pitch) / 2
+    sensors = {
+        name: LineSensor((pitch, 0.0), middle, y0=-distance * math.tan(angle))
+        for name, angle in scanner.views.items()
+    }
     cameras = [Camera("perspective", {"c": options.principal_distance}, name=name) for name in sensors]
     ids: list[str] = []
     poses: list[tuple[Floats, Floats]] = []
     found: list[tuple[Indices, Floats, Floats]] = []
     timed: tuple[list[Timed], list[Timed]] = ([], [])
-    records: tuple[list[Observation], list[Observation]] = ([], [])
-    for each in _passes(layout, flown):
-        lines = Lines([[0.0, each.start, flown.line]])
-        both = _trajectories(each, flown, random)
-        for part, own in zip(records, _records(each, both, flown, random), strict=True):
-            part.extend(own)
+    records: tuple[list[Observations[Any]], list[Observations[Any]]] = ([], [])
+    for each in _passes(layout, options, scanner):
+        lines = Lines([[0.0, each.start, line]])
+        both = _trajectories(each, options, scanner, line, random)
+        _record(records, each, both, options, scanner.every, random)
         pose = about(both[0], each.start + each.seconds / 2)
         for camera, (name, sensor) in zip(cameras, sensors.items(), strict=True):
             ids.append(each.name if len(cameras) == 1 else f"{each.name} {name}")
@@ -123,12 +101,13 @@ def scanned(
     )
 
 
-def _passes(layout: Layout, flown: _Flight) -> Iterator[_Pass]:
+def _passes(layout: Layout, options: SimulationOptions, scanner: LineScanner) -> Iterator[_Pass]:
     """Yield strips, or scenes, in sequence."""
     columns, rows = window(layout)
     all_columns, all_rows = grid(layout)
-    half = flown.options.footprint / 2
-    scenes = flown.scanner.scenes
+    half, scenes = options.footprint / 2, scanner.scenes
+    # Maximum ground distance ahead of the camera in view of a line
+    ahead = options.flying_height * math.tan(max(scanner.views.values()))
     digits = max(2, len(str(layout.strips)))
     strips = [f"{strip:0{digits}d}" for strip in range(1, layout.strips + 1)]
     names = photo_ids(layout) if scenes else strips
@@ -136,20 +115,21 @@ def _passes(layout: Layout, flown: _Flight) -> Iterator[_Pass]:
     for row, name in enumerate(names):
         strip, number = divmod(row, layout.photos_per_strip) if scenes else (row, 0)
         middle = number * layout.base - layout.length / 2 if scenes else 0.0
-        reach = (half if scenes else layout.length / 2) + flown.ahead
+        reach = (half if scenes else layout.length / 2) + ahead
         sense = 1.0 - 2.0 * (strip % 2)
         own = number * layout.columns_per_base + np.arange(len(columns if scenes else all_columns))
         below = strip * layout.rows_per_strip + np.arange(len(rows))
         points = (own[:, np.newaxis] * len(all_rows) + below).ravel()
-        seconds = 2 * reach / flown.scanner.speed
+        seconds = 2 * reach / scanner.speed
         across = strip * layout.separation - layout.width / 2
         yield _Pass(name, start, seconds, sense, middle - sense * reach, across, points)
         start = math.ceil(start + seconds + _BETWEEN)
 
 
-def _trajectories(each: _Pass, flown: _Flight, random: np.random.Generator) -> tuple[Trajectory, Trajectory]:
+def _trajectories(
+    each: _Pass, options: SimulationOptions, scanner: LineScanner, line: float, random: np.random.Generator
+) -> tuple[Trajectory, Trajectory]:
     """Return the true trajectory and the known one, with the same table and other coefficients."""
-    scanner, options = flown.scanner, flown.options
     times = np.arange(-1.0, math.ceil(each.seconds / scanner.every) + 2) * scanner.every + each.start
     along = each.first + each.sense * scanner.speed * (times - each.start)
     places = np.column_stack(
@@ -162,12 +142,13 @@ def _trajectories(each: _Pass, flown: _Flight, random: np.random.Generator) -> t
         periods, phases = random.uniform(*_PERIODS, 3), random.uniform(0, 2 * math.pi, 3)
         waves = np.sin(2 * math.pi * times[:, np.newaxis] / periods + phases)
         vectors[:, axis] = options.tilt * waves.mean(axis=1)
-    axes = rotations_of(np.array([[0.0, 0.0, heading]])) @ rotations_of(vectors)
+    turned = _photocore.vector_rotations(np.array([[0.0, 0.0, heading]]))
+    axes = turned @ _photocore.vector_rotations(vectors)
     table = Table(times, places + np.asarray(options.origin), times, axes)
     true: list[Polynomial | Spline | None] = [None, None]
     given = true.copy()
     # Images would not determine the last coefficients of a spline that extends beyond them.
-    beyond = _BEYOND * flown.line
+    beyond = _BEYOND * line
     bases = (
         (scanner.position, options.position_error, options.position_sd),
         (scanner.rotation, options.attitude_error, options.attitude_sd),
@@ -185,31 +166,26 @@ def _trajectories(each: _Pass, flown: _Flight, random: np.random.Generator) -> t
     )
 
 
-def _records(
-    each: _Pass, both: tuple[Trajectory, Trajectory], flown: _Flight, random: np.random.Generator
-) -> tuple[list[Observation], list[Observation]]:
-    """Return errorless and noisy observations of positions and attitudes of a pass."""
-    every = flown.scanner.every
+def _record(
+    records: tuple[list[Observations[Any]], list[Observations[Any]]],
+    each: _Pass,
+    both: tuple[Trajectory, Trajectory],
+    options: SimulationOptions,
+    every: float,
+    random: np.random.Generator,
+) -> None:
+    """Add errorless and noisy observations of positions and attitudes of a pass."""
     count = math.floor(each.seconds / every + 0.5)
     times = np.asarray(each.start + every * (np.arange(count) + 0.5), dtype=np.float64)
     places, axes = given_poses(both[0], times)
-    parts: tuple[list[Observation], list[Observation]] = ([], [])
-    position_sd, attitude_sd = flown.options.position_sd, flown.options.attitude_sd
     draws = random.standard_normal((2, len(times), 3))
-    for part, trajectory, error in zip(parts, both, (0.0, 1.0), strict=True):
-        if 0 < position_sd < math.inf:
-            observed = places + error * position_sd * draws[0]
-            part += [
-                Position(None, place, sd=position_sd, trajectory=trajectory, time=time)
-                for time, place in zip(times.tolist(), observed, strict=True)
-            ]
-        if 0 < attitude_sd < math.inf:
-            turned = axes @ rotations_of(error * attitude_sd * draws[1])
-            part += [
-                Attitude(None, matrix, sd=attitude_sd, trajectory=trajectory, time=time)
-                for time, matrix in zip(times.tolist(), turned, strict=True)
-            ]
-    return parts
+    for part, trajectory, error in zip(records, both, (0.0, 1.0), strict=True):
+        common = {"photo": None, "trajectory": trajectory, "time": times}
+        if 0 < (sd := options.position_sd) < math.inf:
+            part.append(Position.from_arrays(position=places + error * sd * draws[0], sd=sd, **common))
+        if 0 < (sd := options.attitude_sd) < math.inf:
+            turned = axes @ _photocore.vector_rotations(error * sd * draws[1])
+            part.append(Attitude.from_arrays(attitude=turned, sd=sd, **common))
 
 
 def _images(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Unpack
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from photogram.messages import counted
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.geometry import Spheroid
+from photogram.network.motion import given_poses
 from photogram.network.refraction import Refraction
 from photogram.network.simulated_images import photograph, photographed, seen_side
 from photogram.network.simulated_layout import (
@@ -30,6 +32,7 @@ from photogram.network.simulated_layout import (
 from photogram.network.simulated_motion import rolled
 from photogram.network.simulation_options import LONGEST, LineScanner, RollingShutter, SimulationOptions
 from photogram.network.tables import checked_cameras
+from photogram.network.trajectories import Readout
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -79,9 +82,36 @@ class Simulation:
 
     def to_json(self) -> bytes:
         """Return the truth as a JSON document, `truth.json` of `photogram simulate`."""
-        from photogram.network.simulated_truth import truth_json
+        from photogram.io import json
 
-        return truth_json(self.truth, self.blunders.images, self.blunders.amounts)
+        truth = self.truth
+        degrees = np.array([math.degrees(1), math.degrees(1), 1.0]) if truth.geographic else np.ones(3)
+        position = "longitude and latitude in degrees, height in m" if truth.geographic else "X, Y, Z in m"
+        turn = "photo-to-ground" if truth.photo_to_ground else "ground-to-photo"
+        units = {
+            "position": position,
+            "attitude_rad": f"omega, phi, kappa, {turn}",
+            "error_mm": "what was added to x and y",
+        }
+        if truth.timed:
+            units["motion"] = "s, m/s, rad/s; axes of the photo as columns"
+        rows = self.blunders.images.tolist()
+        document = {
+            "units": units,
+            "photos": _records(
+                id=truth.photo_ids,
+                position=(truth.photo_positions * degrees).tolist(),
+                attitude_rad=truth.photo_attitudes.tolist(),
+            ),
+            "points": _records(id=truth.point_ids, position=(truth.point_positions * degrees).tolist()),
+            **_true_motion(truth),
+            "blunders": _records(
+                photo=[truth.photo_ids[truth.image_photos[row]] for row in rows],
+                point=[truth.point_ids[truth.image_points[row]] for row in rows],
+                error_mm=self.blunders.amounts.tolist(),
+            ),
+        }
+        return json.to_json(document)
 
 
 def simulate(options: SimulationOptions | None = None, **changes: Unpack[SimulationKeywords]) -> Simulation:
@@ -131,8 +161,8 @@ def simulate(options: SimulationOptions | None = None, **changes: Unpack[Simulat
 
         taken = scanned(plan, options, motion, ground, motion_random)
         # The standard deviations apply to trajectories.
-        options = replace(options, position_error=0.0, attitude_error=0.0)
-        options = replace(options, position_sd=math.inf, attitude_sd=math.inf)
+        none: dict[str, Any] = {"position_error": 0.0, "attitude_error": 0.0, "position_sd": math.inf}
+        options = replace(options, **none, attitude_sd=math.inf)
     else:
         photos, rotations = flight(plan, options, flight_random)
         poses = into_object_space(photos, rotations, options)
@@ -172,7 +202,10 @@ def simulate(options: SimulationOptions | None = None, **changes: Unpack[Simulat
         refraction=options.refraction,
         title=_title(options),
     )
-    faults = _blunders(len(xy), options.blunders, options.blunder_size, blunder_random)
+    rows = np.sort(blunder_random.choice(len(xy), min(options.blunders, len(xy)), replace=False))
+    amounts, signs = np.zeros((len(rows), 2)), blunder_random.choice([-1, 1], len(rows))
+    amounts[np.arange(len(rows)), blunder_random.integers(0, 2, len(rows))] = options.blunder_size * signs
+    faults = Blunders(rows.astype(np.int64), amounts)
     noise = options.image_sd * image_random.standard_normal(xy.shape)
     measured = xy + taken.in_images(noise, np.arange(len(xy)))
     measured[faults.images] += taken.in_images(faults.amounts, faults.images)
@@ -252,8 +285,29 @@ def _generator(seed: int | np.random.Generator) -> np.random.Generator:
         raise argument_error("seed", "value", value=error) from None
 
 
-def _blunders(images: int, count: int, size: float, random: np.random.Generator) -> Blunders:
-    rows = np.sort(random.choice(images, min(count, images), replace=False))
-    amounts = np.zeros((len(rows), 2))
-    amounts[np.arange(len(rows)), random.integers(0, 2, len(rows))] = size * random.choice([-1, 1], len(rows))
-    return Blunders(rows.astype(np.int64), amounts)
+def _records(**columns: Iterable[object]) -> list[dict[str, object]]:
+    """Return the rows of columns."""
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def _true_motion(truth: Block) -> dict[str, object]:
+    """Return times, motions and trajectories of a moving simulated block."""
+    own = [each for each in truth.timed if each.trajectory is None]
+    trajectories = []
+    for each in {id(each.trajectory): each.trajectory for each in truth.timed}.values():
+        if each is not None:
+            times = each.table.times
+            places, axes = (values.tolist() for values in given_poses(each, times))
+            poses = {"times": times.tolist(), "positions": places, "axes": axes}
+            trajectories.append({"trajectory": each.name, **poses})
+    readouts = [each for each in truth.unknowns if isinstance(each, Readout)]
+    found = {
+        "readouts": [{"shutter": each.name, "seconds": each.value} for each in readouts],
+        "motions": _records(
+            photo=[each.photo for each in own],
+            velocity=[np.asarray(each.velocity).tolist() for each in own],
+            rate=[np.asarray(each.rotation_rate).tolist() for each in own],
+        ),
+        "trajectories": trajectories,
+    }
+    return {name: rows for name, rows in found.items() if rows}

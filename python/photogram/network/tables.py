@@ -54,6 +54,10 @@ def table_arguments(
         positions[: len(control_ids)] = _columns(points, "points", axes)
         sd[: len(control_ids)] = _columns(points, "points", [f"sd_{axis}" for axis in axes], np.inf)
         sd[np.isnan(sd) | np.isnan(positions)] = np.inf
+    photo_cameras = None
+    if cameras and "camera" in photos:
+        given = list(_column(photos, "photos", "camera"))
+        photo_cameras = photo_indices(given, cameras, _rows(photos, "photos"))
     unit = str(cameras[0].unit) if cameras else "mm"
     if image_sd is None and unit == "mm":
         image_sd = 0.010
@@ -63,7 +67,7 @@ def table_arguments(
         "photo_attitudes": _columns(photos, "photos", ATTITUDE_COLUMNS),
         "principal_distances": _distances(photos, principal_distance, cameras),
         "cameras": cameras,
-        "photo_cameras": _camera_column(photos, cameras),
+        "photo_cameras": photo_cameras,
         "point_ids": point_ids,
         "point_positions": positions,
         "image_photos": _lookup("photo", photo_ids, _name_column(images, "images", "photo")),
@@ -149,13 +153,6 @@ def _distances(photos: Table, principal_distance: float | None, cameras: Sequenc
         given, "photos", "requires", name="a block without cameras", other=f"principal_distance or {name}"
     )
     return _columns(photos, "photos", [name], principal_distance)[:, 0]
-
-
-def _camera_column(photos: Table, cameras: Sequence[Camera]) -> Indices | None:
-    """Return (P,) camera indices of the photos; None without a camera column."""
-    if not cameras or "camera" not in photos:
-        return None
-    return photo_indices(list(_column(photos, "photos", "camera")), cameras, _rows(photos, "photos"))
 
 
 def _observed(photos: Table, columns: Sequence[str]) -> Floats | None:

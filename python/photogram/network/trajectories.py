@@ -212,12 +212,6 @@ class Polynomial:
         """Number of coefficients."""
         return self.degree + 1
 
-    @property
-    def _placed(self) -> tuple[float, float]:
-        if self.reference is None or self.scale is None:
-            raise argument_error("polynomial", "missing", name="reference or scale")
-        return self.reference, self.scale
-
     def over(self, first: float, last: float) -> Polynomial:
         """Return the polynomial with reference and scale for a time span."""
         _degree("polynomial", self.degree)
@@ -232,8 +226,9 @@ class Polynomial:
 
     def row(self, origin: float) -> BasisRow:
         """Return the row for the core, with times relative to an origin."""
-        reference, scale = self._placed
-        return "polynomial", self.degree, [reference - origin, scale]
+        if self.reference is None or self.scale is None:
+            raise argument_error("polynomial", "missing", name="reference or scale")
+        return "polynomial", self.degree, [self.reference - origin, self.scale]
 
     @property
     def smoothed(self) -> list[tuple[list[int], list[float], float]]:
@@ -317,20 +312,23 @@ class Spline:
             time, sd = self.correlation
             good = 0 < time < np.inf and 0 < sd < np.inf
             require(good, "correlation", "positive", value=self.correlation)
-            knots, p = self._knots, self.degree
-            places = np.array([knots[k + 1 : k + p + 1].mean() for k in range(self.count)])
             found.append(([0], [1.0], sd))
-            for k, step in enumerate(np.diff(places).tolist()):
+            for k, step in enumerate(np.diff(self._places).tolist()):
                 kept = float(np.exp(-step / time))
                 found.append(([k, k + 1], [-kept, 1.0], sd * float(np.sqrt(1 - kept**2))))
         return found
+
+    @property
+    def _places(self) -> Floats:
+        """Greville points of the coefficients."""
+        knots, p = self._knots, self.degree
+        return np.array([knots[k + 1 : k + p + 1].mean() for k in range(self.count)])
 
     def _differences(self, order: int, sd: float) -> list[tuple[list[int], list[float], float]]:
         """Return divided differences at the Greville points, scaled by h^q."""
         if order not in (1, 2, 3) or not 0 < sd < np.inf:
             raise kind_error("smooth", "an order of 1, 2 or 3 and a standard deviation", self.smooth)
-        knots, p = self._knots, self.degree
-        places = np.array([knots[k + 1 : k + p + 1].mean() for k in range(self.count)])
+        places = self._places
         h = float(np.median(np.diff(places)))
         found = []
         for k in range(self.count - order):

@@ -241,7 +241,7 @@ def determine(
 
 
 def _observed(grid: Grid, weight: Floats) -> Observed:
-    return Observed.checked(
+    return Observed(
         grid.model, 0.0, grid.plate_xy, np.repeat(weight[:, np.newaxis] ** -0.5, 2, axis=1),
         -grid.principal_distance, [str(each) for each in grid.ids],
     )  # fmt: skip

@@ -45,7 +45,8 @@ def agreement(
     count, width = differences.shape
     rows = np.isfinite(differences)
     alone = cofactors.ndim == 3
-    own = cofactors if alone else _blocks(cofactors, width)
+    each = range(count)
+    own = cofactors if alone else cofactors.reshape(count, width, count, width)[each, :, each, :]
     found, dimension = np.full(count, math.nan), np.full(count, math.nan)
     sd = np.sqrt(np.diagonal(scale * own + given, axis1=1, axis2=2))
     for point in np.flatnonzero(rows.any(axis=1)).tolist():
@@ -68,11 +69,6 @@ def agreement(
     else:
         points = Tested(Phrase("test.checks"), found / dimension, name, "F", dimension, second)
     return Agreement(points, together, sd, apart, joint)
-
-
-def _blocks(matrix: Floats, width: int) -> Floats:
-    count = len(matrix) // width
-    return np.asarray(matrix.reshape(count, width, count, width)[range(count), :, range(count), :])
 
 
 def quadratic(d: Floats, covariance: Floats) -> tuple[float, float]:

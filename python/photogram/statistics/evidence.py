@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -271,12 +272,15 @@ class Evidence:
     @cached_property
     def _falls(self) -> tuple[float, float]:
         """Decreases of the sum of squares with a lens, and without one observation."""
-        return (
-            max(
-                (each.fall for each in self.found.systematic if each.significant and each.large), default=0.0
-            ),
-            max((_as_fall(each, place) for _, each, place in self.gross), default=0.0),
+        patterns = (each.fall for each in self.found.systematic if each.significant and each.large)
+        # Tests t and F are not decreases.
+        powers = {"w": 2, "T": 1}
+        single = (
+            float(each.values[place]) ** powers[each.statistic]
+            for _, each, place in self.gross
+            if each.statistic in powers
         )
+        return max(patterns, default=0.0), max(single, default=0.0)
 
     @cached_property
     def factor(self) -> float:
@@ -326,16 +330,20 @@ class Evidence:
     def tests(self) -> list[Test]:
         """Return the global test, largest tests by type, and tests of patterns."""
         whole = [] if self.test is None else [_whole(self.test)]
-        largest = [_largest(each, self.level, self.number) for each in self.found.observations]
+        largest = [(each, self.level, self.number) for each in self.found.observations]
         if (checks := self.found.checks) is not None:
             if checks.together is not None:
                 whole.append(
                     replace(_whole(checks.together), kind=Phrase("test.checks_together"), statistic="T/m")
                 )
             own = self._of_each_check(checks, SUSPECT)
-            largest.append(_largest(checks.points, own, self._count(checks.points)))
-        patterns = [_of_pattern(each) for each in self.found.systematic]
-        return [*whole, *(each for each in largest if each is not None), *patterns]
+            largest.append((checks.points, own, self._count(checks.points)))
+        found = [
+            _test_at(each, place, level, number)
+            for each, level, number in largest
+            if (place := each.largest()) is not None
+        ]
+        return [*whole, *found, *map(_of_pattern, self.found.systematic)]
 
 
 def part_of(name: Text, statistic: str, value: float) -> Phrase:
@@ -347,12 +355,6 @@ def factor_of(test: GlobalTest) -> Phrase:
     """Return the factor of a test with its interval."""
     low, high = test.interval
     return Phrase("part.factor", {"factor": test.factor, "low": low, "high": high})
-
-
-def _as_fall(tested: Tested, place: tuple[int, ...]) -> float:
-    """Return the decrease of Omega without an observation; 0 for t and F."""
-    value = float(tested.values[place])
-    return {"w": value**2, "T": value}.get(tested.statistic, 0.0)
 
 
 def _relative(tested: Tested) -> Floats:
@@ -367,28 +369,22 @@ def _relative(tested: Tested) -> Floats:
     return np.asarray(np.sqrt(values / medians))
 
 
-def _distribution(
-    statistic: str, level: float, dimension: float, second: float
-) -> tuple[str, tuple[float, ...], float]:
-    """Return the distribution of a test value, its degrees of freedom, and its limit."""
-    if statistic == "w":
-        return "normal", (), critical_normal(level)
-    if statistic == "t":
-        return "t", (second,), critical_student(level, second)
-    if statistic == "T":
-        return "chi2", (dimension,), critical_chi_square(level, dimension)
-    return "F", (dimension, second), critical_fisher(level, dimension, second)
+_CRITICAL: dict[str, tuple[str, Callable[..., float]]] = {
+    "w": ("normal", critical_normal),
+    "t": ("t", critical_student),
+    "T": ("chi2", critical_chi_square),
+    "F": ("F", critical_fisher),
+}  # Distributions of test values, and critical values for a level and degrees of freedom
 
 
 def _whole(test: GlobalTest) -> Test:
+    f, reference = test.degrees_of_freedom, test.reference_dof
     return Test(
         kind=GLOBAL,
         subject="",
         statistic="s^2",
-        distribution="chi2/f" if math.isinf(test.reference_dof) else "F",
-        dof=(test.degrees_of_freedom,)
-        if math.isinf(test.reference_dof)
-        else (test.degrees_of_freedom, test.reference_dof),
+        distribution="chi2/f" if math.isinf(reference) else "F",
+        dof=(f,) if math.isinf(reference) else (f, reference),
         value=test.variance,
         limits=test.limits,
         p=test.probability,
@@ -400,37 +396,20 @@ def _whole(test: GlobalTest) -> Test:
 
 
 def _of_pattern(pattern: Systematic) -> Test:
-    return Test(
-        kind=pattern.kind,
-        subject=pattern.subject,
-        statistic=pattern.statistic,
-        distribution=pattern.distribution,
-        dof=pattern.dof,
-        value=pattern.value,
-        limits=(None, None),
-        p=pattern.probability,
-        log10_p=_log10(pattern.probability),
-        level=pattern.level,
-        tests=1,
-        accepted=not pattern.significant,
-    )
-
-
-def _log10(p: float) -> float:
-    return math.log10(p) if p > 0 else -math.inf
-
-
-def _largest(tested: Tested, level: float, number: int) -> Test | None:
-    """Return the least probable test of a type; None if nothing is tested."""
-    place = tested.largest()
-    return None if place is None else _test_at(tested, place, level, number)
+    same = ("kind", "subject", "statistic", "distribution", "dof", "value", "level")
+    shared: dict[str, Any] = {name: getattr(pattern, name) for name in same}
+    p, accepted = pattern.probability, not pattern.significant
+    log10_p = math.log10(p) if p > 0 else -math.inf
+    return Test(**shared, limits=(None, None), p=p, log10_p=log10_p, tests=1, accepted=accepted)
 
 
 def _test_at(tested: Tested, place: tuple[int, ...], level: float, number: int) -> Test:
     one = tested.at(place)
     dimension, second = float(np.asarray(one.dimension)[0]), float(np.asarray(one.second)[0])
     least = float(one.log_probability()[0])
-    distribution, dof, limit = _distribution(tested.statistic, level, dimension, second)
+    dof = {"w": (), "t": (second,), "T": (dimension,)}.get(tested.statistic, (dimension, second))
+    distribution, critical = _CRITICAL[tested.statistic]
+    limit = critical(level, *dof)
     return Test(
         kind=tested.kind,
         subject=tested.name(place),

@@ -240,12 +240,7 @@ def _gross_errors(e: Evidence) -> Phrase | None:
     if "disputed" in e.codes or (not e.found.robust and (not e.rejected or snooped)):
         return None
     # A few gross errors increase s but not the median; a wrong model increases all residuals.
-    if (
-        e.pattern
-        and e.robust is not None
-        and e.robust > weight_rules.WRONG_ALIKE
-        and e.factor <= weight_rules.WRONG_ALIKE * e.robust
-    ):
+    if e.pattern and weight_rules.are_alike(e):
         return None
     suspects = [*e.found.exchanged, Phrase("part.tests", {"tests": e.named(e.gross)})]
     return Phrase("verdict.gross-errors", {"suspects": suspects, "remedy": _remedy(e)})
@@ -283,7 +278,7 @@ def _remedy(e: Evidence) -> Phrase | str:
 
 def _too_much_removed(e: Evidence) -> Phrase | None:
     found = e.found.snooped
-    if found is None or not found.removed or not found.excessive or weight_rules.are_alike(e):
+    if found is None or not found.removed or not found.excessive or (e.high and weight_rules.are_alike(e)):
         return None
     shares = [
         Phrase("part.share", {"percent": 100 * found.share(kind), "kind": kind}) for kind in found.excessive

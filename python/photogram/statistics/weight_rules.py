@@ -40,7 +40,7 @@ def common_factor(far: bool, e: Evidence) -> Phrase | None:
 
 def are_alike(e: Evidence) -> bool:
     """Whether the standard deviations of all residuals are too small, not a few residuals too large."""
-    return e.high and e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust
+    return e.robust is not None and e.robust > WRONG_ALIKE and e.factor <= WRONG_ALIKE * e.robust
 
 
 def wrong_type(e: Evidence) -> Phrase | None:

@@ -265,7 +265,8 @@ def _measured(
     observed = [np.zeros((k, 0))]
     for name, shape in kind.VALUES:
         value, turns = given[name], shape == (3, 3)
-        if (value is None and turns) or _is_unknown(value):
+        first = value[0] if isinstance(value, list) and value else value
+        if (value is None and turns) or isinstance(first, Unknown):
             observed.append(
                 np.broadcast_to(np.eye(3) if turns else np.zeros(shape), (k, *shape)).reshape(k, -1)
             )
@@ -308,10 +309,6 @@ def _measured(
         if np.ndim(covariance) > 2:
             found["covariance"] = matrices
     return found
-
-
-def _is_unknown(value: object) -> bool:
-    return isinstance(value[0] if isinstance(value, list) and value else value, Unknown)
 
 
 def _rows(name: str, value: Any, shape: tuple[int, ...], count: int | None, *, missing: bool) -> Floats:
