@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.collection.parameters import POSE
+from photogram.plots.accessor import drawings
 from photogram.results.network_document import (
-    drawings,
     network_document,
     network_members,
     size_section,

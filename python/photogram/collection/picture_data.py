@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -29,10 +30,7 @@ class PicturedCollection(PicturedNetwork):
 
     result: AdjustedCollection
 
-    @property
-    def title(self) -> str:
-        """Empty, because collections are untitled."""
-        return ""
+    title = ""  # Collections are untitled
 
     @cached_property
     def plan(self) -> Plan:
@@ -73,19 +71,19 @@ class PicturedCollection(PicturedNetwork):
         """Return (k, 3, 3) covariances of points along the axes of the plan."""
         return np.asarray(self.result.point_covariances[points])
 
-    @property
+    @cached_property
     def footprints(self) -> Floats:
         """No footprints, because the vertical is unknown."""
         return np.empty((0, 1, 3))
 
-    @property
-    def cameras(self) -> tuple[Indices, list[str], bool]:
+    @cached_property
+    def cameras(self) -> tuple[Indices, Sequence[str], bool]:
         """One common frame for the cameras of all photos."""
         photos = len(self.result.photo_parameters)
         together = np.zeros(photos, dtype=np.int64)
         return together, [about("cameras.all", n=photos)], self._camera(0).image_y == "down"
 
-    @property
+    @cached_property
     def correlations(self) -> list[Correlated]:
         """Medians over all photos of the correlations between camera parameters."""
         result = self.result
@@ -102,7 +100,7 @@ class PicturedCollection(PicturedNetwork):
         remark = about("cameras.medians", n=int(good.sum()))
         return [Correlated("cameras", parameters, np.median(tables[good], axis=0), remark)]
 
-    @property
+    @cached_property
     def distortion(self) -> list[Curves]:
         """Distortion curves: some photos faintly, and the photo with median distortion."""
         result = self.result

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,15 +17,11 @@ from photogram.results.network import AdjustedNetwork
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import pandas as pd
-
     from photogram import _photocore
     from photogram.collection import Collection
     from photogram.io.writing import Content
-    from photogram.plots.picture_data import Pictured
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.parts import Terms
-    from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
@@ -72,11 +68,6 @@ class AdjustedCollection(AdjustedNetwork):
 
         return collection_findings(self)
 
-    def _table(self, what: str) -> pd.DataFrame:
-        from photogram.results.tables import table_frame
-
-        return table_frame(self, what)
-
     def _files(self) -> Mapping[str, Content]:
         from photogram.collection.result_files import collection_files
 
@@ -87,13 +78,6 @@ class AdjustedCollection(AdjustedNetwork):
         from photogram.collection.document import collection_document
 
         return collection_document(self)
-
-    @cached_property
-    def reliability_summary(self) -> ReliabilitySummary | None:
-        """The reliability summary of reports; see `AdjustedNetwork`."""
-        from photogram.results.evaluation import reliability_summary
-
-        return reliability_summary(self)
 
     @property
     def given(self) -> Collection:
@@ -149,7 +133,7 @@ class AdjustedCollection(AdjustedNetwork):
 
         return collection_terms(self)
 
-    def _plot_data(self) -> Pictured:
+    def _plot_data(self) -> Any:
         from photogram.collection.picture_data import PicturedCollection
 
         return PicturedCollection(self)

@@ -10,7 +10,7 @@ import numpy as np
 from photogram.diagnosis.findings import Finding, Section
 from photogram.lazy_dataclasses import asdict
 from photogram.messages import counted, listed
-from photogram.results.network_document import drawings
+from photogram.plots.accessor import drawings
 from photogram.results.result import Result
 from photogram.show import page, quantity
 from photogram.show.judgement import judged, verdict_table

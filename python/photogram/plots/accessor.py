@@ -12,8 +12,7 @@ from photogram.errors import InputError
 from photogram.plots.distortion import correlations, distortion
 from photogram.plots.features import features
 from photogram.plots.network import network, undetected
-from photogram.plots.redundancy import redundancy
-from photogram.plots.residuals import films, residuals
+from photogram.plots.residuals import films, redundancy, residuals
 from photogram.plots.tests import tests
 from photogram.plots.trajectories import trajectory
 from photogram.show.page import Drawing, about
@@ -104,7 +103,10 @@ def sketch_of(result: object, name: str) -> Plot | None:
         return None
 
 
-def drawings(result: object, names: Sequence[str]) -> dict[str, Drawing]:
+PICTURES = ("network", "residuals", "redundancy", "tests", "correlations", "distortion", "features", "films")
+
+
+def drawings(result: object, names: Sequence[str] = PICTURES) -> dict[str, Drawing]:
     """Return the drawings of a result by name; those without data are empty."""
     return {
         name: Drawing(

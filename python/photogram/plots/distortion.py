@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
-from photogram.plots.picture_data import Correlated, Curve, Curves, display_unit
+from photogram.plots.picture_data import Correlated, Curves, display_unit
 from photogram.plots.selection import first_panels
 from photogram.show.sketch.marks import Line, Mark, Mesh, Panel, Shades, Texts, band, horizontal_line, spread
 from photogram.show.sketch.plot import Plot
@@ -67,20 +67,16 @@ def _column(curves: Curves) -> list[Panel]:
         marks += [*_dashed(curves.radii, factor * curve.values, seen, INK, ""), horizontal_line(0.0, FAINT)]
         title = curve.name if number else f"Radial distortion of {curves.camera}"
         below = "" if banded or number + 1 < len(curves.curves) else named
-        limits = np.column_stack([across, _reach(curves, curve)])
+        # Without effect of extreme single photos.
+        ends = [*np.quantile(curves.others, [0.1, 0.9], axis=0)] if len(curves.others) else []
+        bands = (curve.values + sign * sd for sd in curve.bands.values() for sign in (-1, 1))
+        reach = spread(0.0, *(factor * each for each in (curve.values, *ends, *bands)))
+        limits = np.column_stack([across, reach])
         found.append(Panel(limits, marks, title, below, unit, legend="below" if curve.bands else ""))
     if banded:
         limits = np.column_stack([across, (0.0, spread(*sizes)[1])])
         found.append(Panel(limits, deviations, "", named, f"sd, {unit}", legend="below"))
     return found
-
-
-def _reach(curves: Curves, curve: Curve) -> tuple[float, float]:
-    """Return the limits of a curve, without effect of extreme single photos."""
-    factor, _ = display_unit(curves.unit)
-    ends = [*np.quantile(curves.others, [0.1, 0.9], axis=0)] if len(curves.others) else []
-    bands = (curve.values + sign * sd for sd in curve.bands.values() for sign in (-1, 1))
-    return spread(0.0, *(factor * each for each in (curve.values, *ends, *bands)))
 
 
 def _dashed(radii: Floats, values: Floats, seen: Bools, colour: str, label: str) -> list[Mark]:

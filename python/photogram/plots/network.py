@@ -10,7 +10,7 @@ import numpy as np
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
-from photogram.plots.picture_data import Pictured, Plan
+from photogram.plots.picture_data import Plan
 from photogram.plots.selection import thinned
 from photogram.show.sketch import marks as shapes
 from photogram.show.sketch.marks import Mark, Markers, Panel, ScaleBar, Shades
@@ -48,12 +48,23 @@ def network(result: Any, *, plane: str | None = None) -> Plot:
     view = View(drawn.plan, _plane(drawn.plan, plane))
     footprints, notes = drawn.footprints if view.axes[2] == 2 else np.empty((0, 1, 3)), list[str]()
     view.include(footprints)
-    marks = [*_footprints(view, footprints, notes), *_points(view, notes), *_photos(view, notes)]
+    marks = [*_footprints(view, footprints, notes), *_points(view, notes)]
+    photos, note = thinned("photos", np.arange(len(view.photos)), MAX_PHOTOS)
+    notes.append(note)
+    size = float(np.clip(60.0 / np.sqrt(len(photos)), 2.0, 7.0))
+    colour, label = INK if len(photos) <= 300 else FAINT, f"photo ({len(view.photos):,})"
+    marks.append(Markers(view.photos[photos], "+", size, colour, edge=0.7, label=label, layer=3.0))
     control, arrows, ends = _control(view, notes)
     ellipses, bars = _ellipses(drawn, view, notes)
     beyond = np.count_nonzero(view.known & ~view.inside)
     notes.append(f"{beyond} points lie beyond the picture" if beyond else "")
-    marks += [*ellipses, *control, *_names(view, ends)]
+    marks += [*ellipses, *control]
+    plan, known = view.plan, np.flatnonzero((view.plan.kinds != "pass") & view.known)
+    known = known if len(known) <= MAX_NAMES else known[:0]
+    count = len(plan.photo_ids) if len(plan.photo_ids) <= MAX_NAMES else 0
+    if texts := [*(plan.point_ids[row] for row in known.tolist()), *plan.photo_ids[:count]]:
+        places = np.concatenate([view.points[known], view.photos[:count]])
+        marks.append(shapes.Names(places, texts, [INK] * len(known) + [SOFT] * count, ends))
     return view.plot(marks, title=drawn.title or "Network", notes=notes, bars=[*bars, *arrows])
 
 
@@ -156,15 +167,6 @@ def _footprints(view: View, outlines: Floats, notes: list[str]) -> list[Mark]:
     return [shapes.Polygons(shown, SKY, inside, "#738c9e", edge, 0.6, label="footprint of a photo")]
 
 
-def _photos(view: View, notes: list[str]) -> list[Mark]:
-    count = len(view.photos)
-    chosen, note = thinned("photos", np.arange(count), MAX_PHOTOS)
-    notes.append(note)
-    size = float(np.clip(60.0 / np.sqrt(len(chosen)), 2.0, 7.0))
-    colour, label = INK if len(chosen) <= 300 else FAINT, f"photo ({count:,})"
-    return [Markers(view.photos[chosen], "+", size, colour, edge=0.7, label=label, layer=3.0)]
-
-
 def _points(view: View, notes: list[str]) -> list[Mark]:
     plan = view.plan
     rows = np.flatnonzero((plan.kinds == "pass") & view.known)
@@ -181,20 +183,16 @@ def _points(view: View, notes: list[str]) -> list[Mark]:
     marks = list[Mark]()
     for colour, number in zip(colours, there, strict=True):
         own = view.points[chosen[every[chosen] == number]]
-        label = f"{_class(number, plan.rays[rows])} ({int((classes == number).sum()):,})"
+        low, *more = MIN_RAYS_OF_CLASSES[number : number + 2]
+        high, name = min(more[0] - 1, int(plan.rays[rows].max())) if more else 0, f"{low} rays and more"
+        if more:
+            name = f"{low} ray{'s' * (low > 1)}" if high <= low else f"{low} to {high} rays"
+        label = f"{name} ({int((classes == number).sum()):,})"
         marks.append(Markers(own, "o", size, shapes.hexadecimal(colour), label=label))
     return marks
 
 
-def _class(number: int, rays: Indices) -> str:
-    low = MIN_RAYS_OF_CLASSES[number]
-    if number + 1 == len(MIN_RAYS_OF_CLASSES):
-        return f"{low} rays and more"
-    high = min(MIN_RAYS_OF_CLASSES[number + 1] - 1, int(rays.max()))
-    return f"{low} ray{'s' * (low > 1)}" if high <= low else f"{low} to {high} rays"
-
-
-def _ellipses(drawn: Pictured, view: View, notes: list[str]) -> tuple[list[Mark], list[ScaleBar]]:
+def _ellipses(drawn: Any, view: View, notes: list[str]) -> tuple[list[Mark], list[ScaleBar]]:
     """Return error ellipses of points, or medians by cell, and their scale bar."""
     rows, pair, extent = np.flatnonzero(view.inside), list(view.axes[:2]), view.extent
     covariances = drawn.covariances(rows)[:, pair][:, :, pair]
@@ -285,17 +283,6 @@ def usual(differences: Floats) -> float:
     """Return a size above nine tenths of (k, 3) differences; 0 without any."""
     sizes = np.sqrt(np.nansum(differences**2, axis=1))
     return float(np.quantile(sizes[sizes > 0], 0.9)) if (sizes > 0).any() else 0.0
-
-
-def _names(view: View, ends: Floats) -> list[Mark]:
-    plan = view.plan
-    control = np.flatnonzero((plan.kinds != "pass") & view.known)
-    control = control if len(control) <= MAX_NAMES else control[:0]
-    photos = len(plan.photo_ids) if len(plan.photo_ids) <= MAX_NAMES else 0
-    places = np.concatenate([view.points[control], view.photos[:photos]])
-    texts = [*(plan.point_ids[row] for row in control.tolist()), *plan.photo_ids[:photos]]
-    colours = [INK] * len(control) + [SOFT] * photos
-    return [shapes.Names(places, texts, colours, ends)] if texts else []
 
 
 MAX_STATIONS = 300

@@ -1,12 +1,12 @@
 """The data of plots: arrays of any adjusted network, in metric axes.
 
-Plots do not depend on classes of results; the method `_plot_data` of a result returns a `Pictured`.
+Plots do not depend on classes of results; the method `_plot_data` of a result returns an object with these
+data as attributes, such as `results.picture_data.PicturedNetwork`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.show.quantity import Axis
-from photogram.statistics.findings import Tested
 
 
 def display_unit(unit: str, largest: float = 0.0) -> tuple[float, str]:
@@ -89,18 +88,6 @@ class Curves:
 
 
 @dataclass(frozen=True, eq=False)
-class Deviations:
-    """Distances of n points from a feature that is fitted to them."""
-
-    title: str  # Name of the feature
-    unit: str  # Of lengths
-    points: Sequence[str]  # The names of the points
-    directions: Sequence[str]  # Names of the d deviations of each point
-    values: Floats  # (n, d) deviations, and k times their standard deviations
-    expanded: Floats
-
-
-@dataclass(frozen=True, eq=False)
 class VectorField:
     """Small vectors over the frame of a camera, or over a plane."""
 
@@ -122,48 +109,3 @@ class Moved:
     limit: float  # Standard deviations from which on a change counts
     suspects: Floats  # (k, 3) points and stations of an erroneous observation
     several: int  # Number of points in the network
-
-
-class Pictured(Protocol):
-    """The plot data of an adjusted network; each part is computed on demand."""
-
-    @property
-    def title(self) -> str: ...  # Name of the network, or an empty text
-    @property
-    def plan(self) -> Plan: ...
-    def covariances(
-        self, points: Indices
-    ) -> Floats: ...  # (k, 3, 3) along the axes of the plan; NaN if missing
-
-    def lengths(self, points: Indices) -> Floats: ...  # (k, 3) lengths of the units of their coordinates
-    @property
-    def poses(self) -> Floats: ...  # (P, 6, 6) cofactors of positions and rotations
-    @property
-    def scanned(self) -> Bools: ...  # (P,) photos of scanners, with a station for each line
-
-    # (P, v, 3) closed outlines of photos on level ground, in the axes of the plan. NaN for photos without
-    # ground; (0, v, 3) if no axis of the plan is vertical.
-    @property
-    def footprints(self) -> Floats: ...
-    @property
-    def images(self) -> Images: ...
-    @property
-    def tested(self) -> Sequence[Tested]: ...  # All observations with their standardized residuals, by type
-    @property
-    def outlying(self) -> list[Bools]: ...  # Masks of components that are outliers of the verdict
-    def moved(
-        self, error: int | None
-    ) -> Moved | None: ...  # By default of the worst error; None: not computed
-    @property
-    def unit_weight(self) -> float: ...  # The root of the variance of unit weight; 1 if undefined
-    @property
-    def correlations(self) -> list[Correlated]: ...  # Of cameras with several estimated parameters
-    @property
-    def distortion(self) -> list[Curves]: ...  # Of cameras with radial distortion
-    @property
-    def deviations(self) -> list[Deviations]:  # Of points from features
-        return []
-
-    @property
-    def films(self) -> list[VectorField]:  # Mean residuals of the marks of cameras, and patterns of films
-        return []

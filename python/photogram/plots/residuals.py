@@ -1,4 +1,4 @@
-"""Residuals of images and fiducial marks, and film patterns, as fields over the frame of each camera."""
+"""Residuals and redundancy numbers of images, residuals of fiducial marks and film patterns, over frames."""
 
 from __future__ import annotations
 
@@ -9,12 +9,15 @@ import numpy as np
 
 from photogram.arguments.arrays import bounds
 from photogram.arguments.types import Floats
+from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
+from photogram.plots.network import View
 from photogram.plots.picture_data import Images, VectorField, display_unit
-from photogram.plots.selection import Cells, cells, first_panels
-from photogram.show.sketch.marks import Arrows, Mark, Markers, Names, Panel, ScaleBar, around
+from photogram.plots.selection import Cells, cells, first_panels, thinned
+from photogram.show.sketch.marks import Arrows, Mark, Markers, Mesh, Names, Panel, ScaleBar, Shades, around
 from photogram.show.sketch.plot import Plot, side_by_side
 from photogram.show.style import FAINT, INK, MARKED, round_length
+from photogram.words import phrase
 
 MAX_SINGLE_IMAGES = 900  # More image points of a camera are drawn as means of cells
 MAX_CELLS = 16  # Along the longer side of the frame
@@ -35,7 +38,12 @@ def residuals(result: Any) -> Plot:
     Significant means are coloured (1 percent for all cells together).
     """
     images = result._plot_data().images
-    cameras, left_out = largest_cameras(images)
+    counts = np.bincount(images.cameras, minlength=len(images.names))
+    there = int((counts > 0).sum())
+    chosen = np.sort(np.argsort(-counts, kind="stable")[: min(MAX_CAMERAS, there)]).tolist()
+    cameras, left_out = chosen or [0], ""
+    if there > MAX_CAMERAS:
+        left_out = f"{len(chosen)} of {there} cameras are drawn, those with the most images"
     columns = min(3, len(cameras))
     rows = -(-len(cameras) // columns)
     width = 6.4 if columns == 1 else 4.2 * columns
@@ -48,15 +56,6 @@ def residuals(result: Any) -> Plot:
     high = rows * (float(np.clip(up / across, 0.3, 1.5)) * (width / columns - 0.75) + beside)
     found = [_field(images, camera, left_out if camera == cameras[-1] else "") for camera in cameras]
     return Plot(width, high, found, columns)
-
-
-def largest_cameras(images: Images, most: int = MAX_CAMERAS) -> tuple[list[int], str]:
-    """Return the cameras with most observations, and a remark on the others."""
-    counts = np.bincount(images.cameras, minlength=len(images.names))
-    there = int((counts > 0).sum())
-    chosen = np.sort(np.argsort(-counts, kind="stable")[: min(most, there)]).tolist()
-    said = f"{len(chosen)} of {there} cameras are drawn, those with the most images" if there > most else ""
-    return chosen or [0], said
 
 
 def frame(images: Images, edges: Floats, *, scanned: bool = False) -> Panel:
@@ -153,3 +152,68 @@ def vector_panel(each: VectorField, longest: float = math.nan) -> Panel:
         marks.append(Names(each.places, each.labels, [INK] * len(each.labels)))
     limits, across, up = around(each.places, MARGIN_OF_FIELD), f"{x.name}, {x.unit}", f"{y.name}, {y.unit}"
     return Panel(limits, marks, each.title, across, up, equal=True, bars=bars)
+
+
+MAX_SINGLE_NUMBERS = 600  # More image points are drawn as means of cells
+CELLS_OF_FRAME = 16  # Along the longer side
+MAX_SINGLE_POINTS = 6000  # More points of the network are drawn as means of cells
+CELLS_OF_NETWORK = 60  # Along the longer side
+MAX_STATIONS = 1000
+SHADES = Shades(0.0, 1.0, "redundancy number, 0 to 1")
+
+
+def redundancy(result: Any) -> Plot:
+    """Plot redundancy numbers of observations over frames, and of points in plan.
+
+    A redundancy number is the part of an error that is visible in the residual of its own observation, from 0
+    (nothing) to 1 (all). Values are means of x and y.
+
+    Raises
+    ------
+    InputError
+        If redundancy numbers were not computed (`covariance=False`).
+    """
+    drawn = result._plot_data()
+    images = drawn.images
+    values = images.redundancy.mean(axis=1)
+    if not np.isfinite(values).any():
+        raise InputError(phrase("plot.redundancy"))
+    # Observations over frames, or samples and lines if all are scanned.
+    scanned = bool(images.scanned.all())
+    kept = ~images.scanned | scanned
+    xy, shown = images.xy[kept], values[kept]
+    said = "" if kept.all() else f"{np.count_nonzero(~kept):,} images of scanners are left out"
+    grid = cells(xy, CELLS_OF_FRAME)
+    over = "samples and lines" if scanned else "the frame"
+    many = len(shown) > MAX_SINGLE_NUMBERS
+    marks, cells_are = _shaded(xy, shown, np.sqrt(14.0), grid if many else None, "images")
+    over_frame = replace(
+        frame(images, grid.edges, scanned=scanned),
+        marks=[marks],
+        title=f"Over {over}: mean {np.nanmean(shown):.2f}, least {np.nanmin(shown):.2f}",
+        notes=[cells_are, said],
+    )
+    # Points coloured by least redundancy number, or means of cells.
+    view = View(drawn.plan)
+    least = np.full(len(view.points), np.inf)
+    np.minimum.at(least, images.points, values)
+    rows = np.flatnonzero(np.isfinite(least) & view.known & view.inside)
+    places = view.points[rows]
+    size = float(np.sqrt(np.clip(9000.0 / max(len(rows), 1), 3.0, 20.0)))
+    of_places = cells(places, CELLS_OF_NETWORK) if len(rows) > MAX_SINGLE_POINTS else None
+    points, cells_are = _shaded(places, least[rows], size, of_places, "points")
+    photos, _ = thinned("photos", np.arange(len(view.photos)), MAX_STATIONS)
+    stations = Markers(view.photos[photos], "+", 3.0, edge=0.5, opacity=0.5)
+    title = "Over the network: the least of the images of a point"
+    over_network = view.panel([points, stations], title=title, notes=[cells_are], shades=SHADES)
+    return Plot(10.5, 4.9, [over_frame, over_network], 2)
+
+
+def _shaded(places: Floats, values: Floats, size: float, grid: Cells | None, what: str) -> tuple[Mark, str]:
+    """Return coloured points, or the means of cells with a note."""
+    if grid is None:
+        return Markers(places, "o", size, values=values, shades=SHADES, layer=1.0), ""
+    means = grid.means(values).reshape(grid.rows, grid.columns)
+    counts = grid.counts[grid.counts > 0]
+    note = f"means of cells with {counts.min():,} to {counts.max():,} {what}"
+    return Mesh(grid.edges, means, SHADES), note

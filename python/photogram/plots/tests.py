@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from heapq import nlargest
 from statistics import NormalDist
@@ -48,7 +47,14 @@ def tests(result: Any) -> Plot:
     marked, values = np.concatenate([each.ravel() for each in outlying])[tested], values[tested]
     if len(values) < 2:
         raise InputError(phrase("plot.tests"))
-    quantiles = _quantiles(values, marked, _worst(groups, outlying), drawn.unit_weight)
+    found = (
+        (float(each.values[index]), each, index)
+        for each, own in zip(groups, outlying, strict=True)
+        for index in map(tuple, np.argwhere(own & np.isfinite(each.values)).tolist())
+    )
+    largest = nlargest(MAX_NAMES, found, key=lambda one: abs(one[0]))
+    worst = [(value, str(each.name(index))) for value, each, index in largest]
+    quantiles = _quantiles(values, marked, worst, drawn.unit_weight)
     return Plot(10.0, 4.6, [_histogram(values, drawn.unit_weight), quantiles], 2)
 
 
@@ -91,7 +97,10 @@ def _bell(x: Floats, sd: float) -> Floats:
 
 def _quantiles(values: Floats, marked: Bools, worst: list[tuple[float, str]], unit_weight: float) -> Panel:
     order, n = np.argsort(values), len(values)
-    rows, every = _rows(n), values[order]
+    rows, every = np.arange(n), values[order]
+    if n > MAX_QUANTILES:  # All extremes, some between
+        inner = np.linspace(END_VALUES, n - END_VALUES - 1, MAX_QUANTILES - 2 * END_VALUES)
+        rows = np.r_[:END_VALUES, inner.round().astype(np.int64), n - END_VALUES : n]
     probability = (rows + 0.5) / n
     expected, ordered, beyond = normal_quantiles(probability), every[rows], marked[order][rows]
     # Approximate, for order statistics of independent values; residuals are nearly independent.
@@ -123,24 +132,6 @@ def _quantiles(values: Floats, marked: Bools, worst: list[tuple[float, str]], un
         "test value w",
         legend="below",
     )
-
-
-def _rows(n: int) -> Any:
-    """Return the rows of n ordered values to draw: all extremes, some between."""
-    if n <= MAX_QUANTILES:
-        return np.arange(n)
-    inner = np.linspace(END_VALUES, n - END_VALUES - 1, MAX_QUANTILES - 2 * END_VALUES)
-    return np.r_[:END_VALUES, inner.round().astype(np.int64), n - END_VALUES : n]
-
-
-def _worst(groups: Sequence[Tested], outlying: list[Bools]) -> list[tuple[float, str]]:
-    found = (
-        (float(each.values[index]), each, index)
-        for each, own in zip(groups, outlying, strict=True)
-        for index in map(tuple, np.argwhere(own & np.isfinite(each.values)).tolist())
-    )
-    worst = nlargest(MAX_NAMES, found, key=lambda one: abs(one[0]))
-    return [(value, str(each.name(index))) for value, each, index in worst]
 
 
 def normal_quantiles(probability: Floats) -> Floats:

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import replace
 from photogram.messages import unknown_name
@@ -55,23 +54,16 @@ def trajectory(result: Any, *, name: str | None = None) -> Plot:
     ]
     unit = result.block.linear_unit
     heads = f"position, {unit}", "rotation, rad"
-    panels = [
-        _panel(times, corrections[part], sd[:, 3 * part : 3 * part + 3], records, head)
-        for part, head in enumerate(heads)
-    ]
+    panels = list[Panel]()
+    for values, rooms, head in zip(corrections, np.split(sd, 2, axis=1), heads, strict=True):
+        (low, high), marks = spread(values - rooms, values + rooms), list[Mark]()
+        for k, (own, room, colour) in enumerate(zip(values.T, rooms.T, COLOURS, strict=True)):
+            marks.append(band(times, own - room, own + room, colour, 0.2))
+            marks.append(Line(np.column_stack([times, own]), colour, 1.2, label="xyz"[k]))
+        if records:  # The times of observations
+            feet = np.column_stack([records, np.full(len(records), low)])
+            tops = feet[:, 1] + TICK_HEIGHT * (high - low)
+            marks.append(Line(error_bars(feet, feet[:, 1], tops), INK, 1.0))
+        panels.append(Panel(np.column_stack([spread(times), (low, high)]), marks, "", "time, s", head))
     panels[0] = replace(panels[0], title=name, legend="below")
     return Plot(9.0, 3.4, panels, 2)
-
-
-def _panel(times: Floats, values: Floats, sd: Floats, records: list[float], head: str) -> Panel:
-    """Return (t, 3) corrections with their bands, and the times of observations."""
-    low, high = spread(values - sd, values + sd)
-    marks = list[Mark]()
-    for k, colour in enumerate(COLOURS):
-        own, room = values[:, k], sd[:, k]
-        marks.append(band(times, own - room, own + room, colour, 0.2))
-        marks.append(Line(np.column_stack([times, own]), colour, 1.2, label="xyz"[k]))
-    if records:
-        feet = np.column_stack([records, np.full(len(records), low)])
-        marks.append(Line(error_bars(feet, feet[:, 1], feet[:, 1] + TICK_HEIGHT * (high - low)), INK, 1.0))
-    return Panel(np.column_stack([spread(times), (low, high)]), marks, "", "time, s", head)

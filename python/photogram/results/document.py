@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from photogram.network.structuring import structure
+from photogram.plots.accessor import drawings
 from photogram.results import network_document as of_network
 from photogram.results import network_sections as sections
 from photogram.results import tables as declared
@@ -29,7 +30,7 @@ from photogram.words import Phrase, phrase
 
 @np.errstate(over="ignore", invalid="ignore")  # values too large for their unit are infinite
 def block_document(result: Result) -> Document:
-    pictures, (head, figures) = of_network.drawings(result), bandwidths(result)
+    pictures, (head, figures) = drawings(result), bandwidths(result)
     shown, note = notable(result.unknowns)
     tables = [
         Table("common-unknowns", "Common unknowns", for_people(declared.unknowns(shown)), note),
@@ -96,10 +97,6 @@ def _size_section(result: Result) -> Section:
     good += [
         Fact.of(f"Weighted sum of squares, {name}", square, decimals=6) for name, square in groups.items()
     ]
-    return of_network.size_section(result, [*_size(result), *more], good, [_differences(result)])
-
-
-def _differences(result: Result) -> Table:
     kinds: dict[str, Callable[[Result], list[Quantity]]] = {
         "control points": control,
         "unheld components": declared.unheld,
@@ -116,7 +113,8 @@ def _differences(result: Result) -> Table:
         Quantity(values, point_axes(result.block), "difference", head="{}", figures=5),
         *(replace(each, head="{}") for each in plan_deviations(result._terms, values)),
     ]
-    return Table("differences", "Adjusted minus given coordinates", columns)
+    differences = Table("differences", "Adjusted minus given coordinates", columns)
+    return of_network.size_section(result, [*_size(result), *more], good, [differences])
 
 
 def _size(result: Result) -> list[Fact]:

@@ -36,7 +36,6 @@ if TYPE_CHECKING:
 
     from photogram.io.writing import Content
     from photogram.plots import Plots
-    from photogram.plots.picture_data import Pictured
     from photogram.results.hypotheses import Hypotheses
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.parts import Terms
@@ -207,7 +206,7 @@ class AdjustedNetwork(Valued, Judged, Documented, ABC):
     def _terms(self) -> Terms: ...
 
     @abstractmethod
-    def _plot_data(self) -> Pictured: ...
+    def _plot_data(self) -> Any: ...
 
     @abstractmethod
     def _trial(self) -> NetworkTrial: ...
@@ -315,13 +314,15 @@ class AdjustedNetwork(Valued, Judged, Documented, ABC):
             trial.out = lost.out
         return Reliability(trial, self.covariances, lost, level=level, power=power, unit_weight=unit_weight)
 
-    @property
-    @abstractmethod
+    @cached_property
     def reliability_summary(self) -> ReliabilitySummary | None:
         """The reliability summary of reports, with tests of all groups.
 
         None without redundancy numbers or convergence.
         """
+        from photogram.results.evaluation import reliability_summary
+
+        return reliability_summary(self)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
         """Return additional facts for hypotheses; empty by default."""
@@ -476,13 +477,17 @@ class AdjustedNetwork(Valued, Judged, Documented, ABC):
 
         write_whole({folder / name: content for name, content in self._files().items()})
 
-    def _files(self) -> Mapping[str, Content]:
-        """Return the result as files of a folder, by name."""
-        raise NotImplementedError
+    @abstractmethod
+    def _files(self) -> Mapping[str, Content]: ...
 
     def _table(self, what: str) -> pd.DataFrame:
         """Return a table by the type of its items."""
-        raise NotImplementedError
+        import pandas as pd  # slow
+
+        from photogram.results.tables import TABLES
+        from photogram.show.quantity import frame
+
+        return pd.DataFrame(frame(TABLES[what](self)))
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values, sd, attitudes in degrees."""

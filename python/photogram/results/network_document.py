@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Indices
 from photogram.lazy_dataclasses import replace
-from photogram.plots.accessor import drawings as drawn
+from photogram.plots.accessor import drawings
 from photogram.results import network_sections as sections
 from photogram.results import network_tables as declared
 from photogram.results.network import AdjustedNetwork
@@ -18,7 +18,7 @@ from photogram.results.tables import Tests
 from photogram.show import quantity
 from photogram.show.cells import unit_written
 from photogram.show.judgement import remarks_section, verdict_document, verdict_table
-from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section, about, significant
+from photogram.show.page import Document, Fact, Facts, Part, Section, about, significant
 from photogram.show.quantity import Quantities, Quantity, for_people, members, records
 from photogram.statistics.evidence import GLOBAL
 from photogram.words import phrase
@@ -134,11 +134,25 @@ def used_fact(name: str, used: Bools, code: str = "used") -> Fact:
 def size_section(
     result: AdjustedNetwork, size: Sequence[Fact], good: Sequence[Fact], tables: Sequence[quantity.Table] = ()
 ) -> Section:
+    terms, rows = result._terms, list[tuple[Any, ...]]()
+    for what, axes, deviations in (
+        ("points", terms.point_axes, result.point_sd[result.used_points]),
+        ("photos", terms.photo_axes, result.photo_sd),
+    ):
+        for axis, column in zip(axes, deviations.T, strict=True):
+            known = column[np.isfinite(column)] * axis.factor
+            if known.size:
+                rows.append((what, axis.name, *np.quantile(known, (0.5, 0.9, 1.0)), unit_written(axis.small)))
+    heads = ("Standard deviations of", "Component", "Median", "90 % are below", "Largest", "Unit")
+    columns = [
+        Quantity(values, kind="number" if head in heads[2:5] else "name", head=head)
+        for head, values in zip(heads, zip(*rows, strict=True) if rows else ((),) * 6, strict=True)
+    ]
     parts: list[Part] = [
         Facts("Size", [*size, Fact.of("Degrees of freedom", result.degrees_of_freedom)]),
         Facts("Fit", [*good, *_images_facts(result)]),
         *tables,
-        _precision_table(result),
+        quantity.Table("precision", "Precision", columns, about("precision")),
     ]
     return Section("size", "Size and fit", parts)
 
@@ -187,28 +201,6 @@ def _images_facts(result: AdjustedNetwork) -> list[Fact]:
     return facts
 
 
-def _precision_table(result: AdjustedNetwork) -> quantity.Table:
-    terms, rows = result._terms, list[tuple[Any, ...]]()
-    for what, axes, deviations in (
-        ("points", terms.point_axes, result.point_sd[result.used_points]),
-        ("photos", terms.photo_axes, result.photo_sd),
-    ):
-        for axis, column in zip(axes, deviations.T, strict=True):
-            known = column[np.isfinite(column)] * axis.factor
-            if known.size:
-                rows.append((what, axis.name, *np.quantile(known, (0.5, 0.9, 1.0)), unit_written(axis.small)))
-    things, components, median, most, largest, units = zip(*rows, strict=True) if rows else ((),) * 6
-    columns = [
-        Quantity(things, kind="name", head="Standard deviations of"),
-        Quantity(components, kind="name", head="Component"),
-        Quantity(median, head="Median"),
-        Quantity(most, head="90 % are below"),
-        Quantity(largest, head="Largest"),
-        Quantity(units, kind="name", head="Unit"),
-    ]
-    return quantity.Table("precision", "Precision", columns, about("precision"))
-
-
 def _work(result: AdjustedNetwork) -> list[Fact]:
     """Return the elimination order, and numbers of operations, also of other orders."""
     return [
@@ -237,11 +229,3 @@ def _worst_table(tests: Tests, places: Indices) -> quantity.Table:
     columns = [Quantity(names, kind="name", head="Observation")]
     columns += [each for each in tests.columns(places) if each.name != "component"]
     return quantity.Table("worst", "Worst observations", for_people(columns), note)
-
-
-PICTURES = ("network", "residuals", "redundancy", "tests", "correlations", "distortion", "features", "films")
-
-
-def drawings(result: AdjustedNetwork) -> dict[str, Drawing]:
-    """Return the drawings of a result by name; those without data are empty."""
-    return drawn(result, PICTURES)

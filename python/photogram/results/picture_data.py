@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -17,7 +17,6 @@ from photogram.network.rays import LocalAxes, local_axes
 from photogram.plots import picture_data as plots
 from photogram.plots.distortion import side_by_side
 from photogram.results.distortion import DistortionCurve, distortion_curve, lens_field
-from photogram.results.features import Features, directions
 from photogram.results.film_report import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints, metric_covariances
 from photogram.results.network import AdjustedNetwork
@@ -32,16 +31,34 @@ from photogram.statistics.findings import Tested
 from photogram.words import phrase
 
 
-class PicturedNetwork(plots.Pictured):
-    """The plot data of all adjusted networks."""
+class PicturedNetwork(ABC):
+    """The plot data of all adjusted networks; each part is computed on demand.
+
+    Subclasses also have the `title`, `correlations` and `distortion` of cameras, and `footprints`: (P, v, 3)
+    closed outlines of photos on level ground, in the axes of the plan. NaN for photos without ground; (0, v,
+    3) if no axis of the plan is vertical.
+    """
 
     def __init__(self, result: AdjustedNetwork) -> None:
         self.result = result
 
     @property
     @abstractmethod
+    def plan(self) -> plots.Plan: ...
+
+    @property
+    @abstractmethod
     def cameras(self) -> tuple[Indices, Sequence[str], bool]:
         """(P,) cameras of photos, their names, and whether y is downwards."""
+
+    @property
+    def films(self) -> Sequence[plots.VectorField]:
+        """Mean residuals of the marks of cameras, and patterns of films."""
+        return ()
+
+    @abstractmethod
+    def covariances(self, points: Indices) -> Floats:
+        """Return (k, 3, 3) covariances of points along the axes of the plan; NaN if missing."""
 
     @cached_property
     def images(self) -> plots.Images:
@@ -60,7 +77,7 @@ class PicturedNetwork(plots.Pictured):
             scanned=self.scanned[given.image_photos[used]],
         )
 
-    @property
+    @cached_property
     def scanned(self) -> Bools:
         """(P,) photos that are scanner strips: image coordinates are samples and lines."""
         return np.zeros(len(self.result.given.photo_ids), dtype=bool)
@@ -113,7 +130,7 @@ class PicturedBlock(PicturedNetwork):
 
     result: Result
 
-    @property
+    @cached_property
     def title(self) -> str:
         return self.result.block.title
 
@@ -151,7 +168,7 @@ class PicturedBlock(PicturedNetwork):
         found = footprints(self.result).positions()
         return self._metric(found.reshape(-1, 3)).reshape(found.shape)
 
-    @property
+    @cached_property
     def cameras(self) -> tuple[Indices, Sequence[str], bool]:
         block = self.result.block
         _, cameras = block.core_cameras()
@@ -170,7 +187,7 @@ class PicturedBlock(PicturedNetwork):
     def scanned(self) -> Bools:
         return scanners(self.result.block)
 
-    @property
+    @cached_property
     def correlations(self) -> list[plots.Correlated]:
         found = []
         for each in self.result.cameras:
@@ -180,29 +197,13 @@ class PicturedBlock(PicturedNetwork):
                 found.append(plots.Correlated(each.name, [each.names[k] for k in rows], table))
         return found
 
-    @property
+    @cached_property
     def distortion(self) -> list[plots.Curves]:
         curves = [(each, distortion_curve(self.result, each)) for each in self.result.cameras]
         return [curves_of(each, curve) for each, curve in curves if curve is not None]
 
-    @property
-    def deviations(self) -> list[plots.Deviations]:
-        found = self.result.features or Features(())
-        return [
-            plots.Deviations(
-                about("feature.points", name=each.name, kind=each.kind, n=len(each.points)),
-                self.result.block.linear_unit,
-                each.points,
-                directions(each.kind),
-                each.deviations,
-                found.k * each.deviation_sd,
-            )
-            for each in found
-            if each.deviations.size
-        ]
-
-    @property
-    def films(self) -> list[plots.VectorField]:
+    @cached_property
+    def films(self) -> Sequence[plots.VectorField]:
         if not self.result.films:
             return []
         return [*mean_mark_residuals(self.result), *film_patterns(self.result)]

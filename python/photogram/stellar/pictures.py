@@ -34,7 +34,7 @@ _WIDEST = np.radians(110)
 
 @dataclass(frozen=True, eq=False)
 class PicturedStars:
-    """Plot data of star images: the parts of `plots.picture_data.Pictured` without a network."""
+    """Plot data of star images: the parts of `results.picture_data.PicturedNetwork` without a network."""
 
     images: Images
     tested: Sequence[Tested]
