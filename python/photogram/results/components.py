@@ -140,16 +140,6 @@ def weighed_document(found: VarianceComponents, network: Document) -> Document:
 
 
 def components_section(found: VarianceComponents) -> Section:
-    parts: list[Part] = [
-        Remarks([*map(str, statement(found))]),
-        Drawing("picture-components", "Variance components", about("components.caption"), found.plot),
-        components_table(found),
-        Remarks([*map(str, found.estimate.messages)]),
-    ]
-    return Section("components", "Variance components", parts, about("components"))
-
-
-def components_table(found: VarianceComponents) -> Table:
     rows, reference = found.components, found.estimate.reference
     low, high = np.array([each.interval for each in rows]).reshape(-1, 2).T
     codes = ["fixed" if each.held else "to-change" if each.worth_changing else "unchanged" for each in rows]
@@ -169,7 +159,13 @@ def components_table(found: VarianceComponents) -> Table:
         of_each(rows, "held", kind="name", name="held"),
         Quantity([about(f"outcome.{code}") for code in codes], kind="name", head="Outcome"),
     ]
-    return Table("components", "Components", columns, about("components.interval"))
+    parts: list[Part] = [
+        Remarks([*map(str, statement(found))]),
+        Drawing("picture-components", "Variance components", about("components.caption"), found.plot),
+        Table("components", "Components", columns, about("components.interval")),
+        Remarks([*map(str, found.estimate.messages)]),
+    ]
+    return Section("components", "Variance components", parts, about("components"))
 
 
 def statement(found: VarianceComponents) -> list[Phrase]:
@@ -271,7 +267,9 @@ class VarianceFunction(Tabular):
         panel = Panel(limits, marks, "", f"{self.name}{unit}", "factor of the given variance", legend="below")
         return Plot(6.4, 4.0, [panel])
 
-    def _bins_table(self) -> Table:
+    def document(self) -> Document:
+        """Return the document: the function, and quantiles of the radius."""
+        estimate = self.estimate
         low, high = np.array([each.interval for each in self.bins]).reshape(-1, 2).T
         columns = [
             of_each(self.bins, "value", name=self.name, head=self.name.capitalize(), figures=4),
@@ -282,11 +280,7 @@ class VarianceFunction(Tabular):
             column("high", high, "To", decimals=3),
             column("function", [self.factor(each.value) for each in self.bins], "Function", decimals=3),
         ]
-        return Table("bins", "Quantiles: factor of the given variance", columns)
-
-    def document(self) -> Document:
-        """Return the document: the function, and quantiles of the radius."""
-        estimate = self.estimate
+        bins = Table("bins", "Quantiles: factor of the given variance", columns)
         values = zip(("a^2", "b^2"), estimate.coefficients.tolist(), estimate.sd.tolist(), strict=True)
         facts = [
             Fact(
@@ -307,5 +301,5 @@ class VarianceFunction(Tabular):
         function = Section("function", "Function", [Facts("", facts)])
         more = {**members(estimate, "coefficients", "covariance", "converged")}
         more |= {"of": self.name, **members(self, "largest", "test_value", "probability")}
-        sections = [remarks_section(remarks), function, Section.of(self._bins_table())]
+        sections = [remarks_section(remarks), function, Section.of(bins)]
         return Document("Variance function", "", [], [], [], sections, more)

@@ -370,8 +370,9 @@ def _evaluated(function: Callable[..., Any], selected: Selected, values: Floats)
 
 
 def _partials(function: Callable[..., Any], selected: Selected, value: Floats) -> Floats:
-    """Return J: a row for each value, a column for each unknown."""
-    partials = np.zeros((value.size, len(selected.values)))
+    """Return J, (values, unknowns): by complex steps if they are possible and equal to differences."""
+    differences = np.zeros((value.size, len(selected.values)))
+    partials = np.zeros_like(differences)
     for k, sd in enumerate(selected.sd.tolist()):
         if not sd > 0:  # fixed: zero variance for any derivative
             continue
@@ -381,13 +382,7 @@ def _partials(function: Callable[..., Any], selected: Selected, value: Floats) -
             moved[k] += sign * STEP * sd
             ends.append((moved[k], _evaluated(function, selected, moved).ravel()))
         (to, after), (fro, before) = ends
-        partials[:, k] = (after - before) / (to - fro)
-    return _complex_partials(function, selected, partials)
-
-
-def _complex_partials(function: Callable[..., Any], selected: Selected, differences: Floats) -> Floats:
-    """Return J by complex steps if possible and equal to differences."""
-    partials = np.zeros_like(differences)
+        differences[:, k] = (after - before) / (to - fro)
     try:
         for k in np.flatnonzero(selected.sd > 0).tolist():
             moved = selected.values.astype(complex)

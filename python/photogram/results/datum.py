@@ -146,25 +146,22 @@ def datum_messages(block: Block, datum: ResultDatum, point_rays: np.ndarray) -> 
         code = f"free.{datum.kind.partition(' ')[0]}"
         return [Message(phrase(code, datum=datum.phrase)), *messages]
     if datum.kind == "minimum constraints":
-        fixed, levels = held_unknowns(datum.held), _levelled(block, len(datum.held))
-        return [Message(phrase("free.minimum", fixed=fixed, levels=levels or ""))]
+        fixed, kinds = held_unknowns(datum.held), {type(each) for each in block.observations}
+        scale, levels = [] if Distance in kinds else ["scale"], list[Phrase]()
+        beyond, kinds = len(datum.held) - 4 - len(scale), kinds - {Distance}
+        # Motions that a plumb line or equal heights leave undetermined.
+        if kinds == {OnPlumbLine} and beyond in (0, -2):
+            motions = ["place", "azimuth"] if beyond == 0 else ["turn", "shift"]
+            levels = [phrase("free.plumb-line", motions=[phrase(f"free.{name}") for name in motions + scale])]
+        elif kinds == {EqualHeight} and beyond == 1:
+            levels = [phrase("free.equal-heights")]
+        return [Message(phrase("free.minimum", fixed=fixed, levels=levels[0] if levels else ""))]
     if datum.kind == "minimal control":
         return [Message(phrase("free.minimal-control"))]
     held = np.isfinite(block.point_sd) & (point_rays > 0)[:, np.newaxis]
     if held.any() or block.observations or (block.photo_position_sd == 0).all():
         return []
     return [Message(phrase(f"free.weights.{'trajectories' if block.timed else 'photos'}"))]
-
-
-def _levelled(block: Block, held: int) -> Phrase | None:
-    """Return motions that a plumb line or equal heights leave undetermined."""
-    kinds = {type(each) for each in block.observations}
-    scale = [] if Distance in kinds else ["scale"]
-    beyond, kinds = held - 4 - len(scale), kinds - {Distance}
-    if kinds == {OnPlumbLine} and beyond in (0, -2):
-        motions = ["place", "azimuth"] if beyond == 0 else ["turn", "shift"]
-        return phrase("free.plumb-line", motions=[phrase(f"free.{name}") for name in motions + scale])
-    return phrase("free.equal-heights") if kinds == {EqualHeight} and beyond == 1 else None
 
 
 def relative_datum(block: Block, photo: str | None, points: Sequence[str] | None) -> DatumRow:

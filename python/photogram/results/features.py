@@ -256,24 +256,22 @@ def through(feature: Feature) -> Phrase:
 
 
 def features_members(features: Features) -> dict[str, Any]:
-    own = members(features, "k", "coverage", "remarks")
-    return own | {"features": [_member(each) for each in features]}
-
-
-def _member(feature: Feature) -> dict[str, Any]:
-    across = directions(feature.kind)
-    named = [*across, *(f"sd_{name}" for name in across)]
-    numbers = np.hstack([feature.deviations, feature.deviation_sd]).tolist()
-    form = members(feature, "statistic", "freedom", "probability", sentence="form")
-    return {
-        **members(feature, "name", "kind", "points", "covariance"),
-        "quantities": [vars(each) for each in feature.quantities],
-        "deviations": [
-            {"point": point, **dict(zip(named, row, strict=True))}
-            for point, row in zip(feature.points, numbers, strict=False)
-        ],
-        "form": form if feature.statistic is not None else None,
-    }
+    found = []
+    for each in features:
+        across, tested = directions(each.kind), each.statistic is not None
+        names = ["point", *across, *(f"sd_{name}" for name in across)]
+        numbers = np.hstack([each.deviations, each.deviation_sd]).tolist()
+        rows = zip(each.points, numbers, strict=False)
+        form = members(each, "statistic", "freedom", "probability", sentence="form") if tested else None
+        found.append(
+            {
+                **members(each, "name", "kind", "points", "covariance"),
+                "quantities": [vars(own) for own in each.quantities],
+                "deviations": [dict(zip(names, (point, *row), strict=True)) for point, row in rows],
+                "form": form,
+            }
+        )
+    return members(features, "k", "coverage", "remarks") | {"features": found}
 
 
 def features(

@@ -202,12 +202,14 @@ def mark_table(result: Result) -> list[Quantity]:
     ]
 
 
-def scanner_table(result: Result) -> list[Quantity]:
+def films_section(result: Result, drawing: Drawing) -> Section:
+    if not result.films:
+        return Section("films", "Film and fiducials", [])
     of = {id(film.scanner): film.readings for _, film in result.films}
     every = [each for each in result.unknowns if id(each.given) in of]
     of_scanners = partial(of_each, every, axes=_DEVICE)
     readings = [of[id(each.given)] for each in every]
-    return [
+    scanner_table = [
         of_each(every, "name", kind="name", member="scanner", head="Scanner"),
         *members_of_each(readings, pitch_mm="pitch", origin="origin", rows_down="down"),
         Quantity([["Sx", "Sy", "alpha_rad"]] * len(every), member="components"),
@@ -217,11 +219,6 @@ def scanner_table(result: Result) -> list[Quantity]:
         of_scanners("sd", kind="deviation", head="sd {}"),
         *members_of_each(every, "covariance"),
     ]
-
-
-def films_section(result: Result, drawing: Drawing) -> Section:
-    if not result.films:
-        return Section("films", "Film and fiducials", [])
     photos, *rest = for_people(form_table(result))
     numbers, said = rest[:2], rest[2:]
     parts: list[Part] = [
@@ -232,6 +229,6 @@ def films_section(result: Result, drawing: Drawing) -> Section:
         ),
         drawing,
         Table("fiducials", "Fiducial marks", mark_table(result), about("fiducials")),
-        Table("scanners", "Scanners", scanner_table(result)),
+        Table("scanners", "Scanners", scanner_table),
     ]
     return Section("films", "Film and fiducials", parts, about("film-and-fiducials"))

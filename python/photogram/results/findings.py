@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from photogram.arguments.arrays import chosen, finite_rows
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Undetermined
 from photogram.network.block import Block
-from photogram.network.observations.columns import Columns
 from photogram.results.fixed_tests import held_tested, how_to_calibrate
 from photogram.results.hypotheses import FEWEST
 from photogram.results.hypothesis_tests import largest_odds
@@ -57,12 +57,20 @@ def network_findings(
 ) -> Findings:
     """Return the findings of all networks, with tests of fixed values and of patterns."""
     tests, summary = Tests(result), result.reliability_summary
+    test, remarks, of_summary = _whole_test(result), unseen(result), dict[str, Any]()
     lost = None if summary is None else summary.downweighted
-    test = _whole_test(result)
-    assumed = [] if summary is None else summary.hypotheses.assumed()
-    assumptions = [Phrase("line.datum-assumed", {"errors": assumed})] if assumed else []
-    rivals, known = largest_odds(fixed), result.known_weight and summary is not None
-    inseparable = [] if summary is None else summary.hypotheses.inseparable(rivals)
+    if summary is not None:
+        errors, rivals = summary.hypotheses, largest_odds(fixed)
+        if assumed := errors.assumed():
+            remarks.append(Phrase("line.datum-assumed", {"errors": assumed}))
+        remarks += errors.inseparable(rivals)
+        of_summary = {
+            "types": list(summary.types) if result.known_weight else [],
+            "unchecked": [*errors.unchecked(), *_unchecked_control(result, summary.types)],
+            "common": errors.common_errors(rivals),
+            "of_checks": errors.of_checks(),
+            "common_is_harmful": errors.common_is_harmful,
+        }
     return Findings(
         status=result.status,
         observations=[
@@ -71,7 +79,6 @@ def network_findings(
         ],
         degrees_of_freedom=result.degrees_of_freedom,
         global_test=test,
-        types=list(summary.types) if known and summary is not None else [],
         odds=-math.inf if summary is None else summary.hypotheses.odds(rivals),
         untested=Phrase("untested.loss" if result.loss else "untested.freedom"),
         computed=bool(finite_rows(result.redundancy)[chosen(result.used_images)].all()),
@@ -79,14 +86,9 @@ def network_findings(
         snooped=result.snooped if lost is None else lost.removed,
         robust=result.loss is not None,
         unsupported=[] if lost is None else lost.unsupported,
-        remarks=[*unseen(result), *assumptions, *inseparable],
-        unchecked=[]
-        if summary is None
-        else [*summary.hypotheses.unchecked(), *_unchecked_control(result, summary.types)],
-        common=[] if summary is None else summary.hypotheses.common_errors(rivals),
-        of_checks=[] if summary is None else summary.hypotheses.of_checks(),
-        common_is_harmful=summary is not None and summary.hypotheses.common_is_harmful,
+        remarks=remarks,
         can_snoop=True,
+        **of_summary,
     )
 
 
@@ -233,7 +235,7 @@ def duplicates(block: Block, factor: float = 1.0) -> list[Phrase]:
     Images are equal within their noise, additional observations in all digits. `factor` is the factor of the
     given standard deviations that the residuals indicate.
     """
-    messages, repeated = [], _repeated(block)
+    messages, repeated = [], list(_repeated(block))
     if repeated:
         messages.append(phrase("duplicates.observations", n=len(repeated), names=repeated))
     if not len(block.image_xy):
@@ -271,34 +273,23 @@ def _equal_pairs(
     return [(int(i), int(j)) for i, j in found[most] if i != j]
 
 
-def _repeated(block: Block) -> list[str]:
-    """Return names of additional observations with the same objects and values as one before."""
-    found = []
+def _repeated(block: Block) -> Iterator[str]:
+    """Yield names of additional observations with the same objects and values as one before."""
     for columns in block.observations.columns:
-        names = list(zip(columns.table["points"], columns.table["photos"], strict=True))
+        table, seen = columns.table, set()
+        names = list(zip(table["points"], table["photos"], strict=True))
         # Observations of unknowns alone may be repeated constraints.
-        if len(set(names)) < len(names) and any(names[0]):
-            found += list(_copies(columns, names))
-    return found
-
-
-def _copies(columns: Columns, names: list[tuple[tuple[str, ...], tuple[str, ...]]]) -> Iterator[str]:
-    seen = set()
-    times = columns.table.get("time", [None] * len(names))
-    unknowns = [tuple(map(id, row)) for row in columns.table["unknowns"]]
-    keys = zip(
-        names, unknowns, times, map(tuple, np.asarray(columns.table["observed"]).tolist()), strict=True
-    )
-    for row, key in enumerate(keys):
-        if key not in seen:
-            seen.add(key)
+        if len(set(names)) == len(names) or not any(names[0]):
             continue
-        sd = math.sqrt(float(np.asarray(columns.table["precision"][row]).diagonal().max()))
-        if _resolution(key[3]) < ROUNDED * sd:
-            yield f"{columns.label} {' - '.join(key[0][0] + key[0][1])}"
-
-
-def _resolution(values: tuple[float, ...]) -> float:
-    """Return the unit of the last decimal of the value with the most decimals."""
-    decimals = (repr(value).partition("e")[0].partition(".")[2].rstrip("0") for value in values)
-    return float(10.0 ** -max(map(len, decimals)))
+        times = table.get("time", [None] * len(names))
+        unknowns = [tuple(map(id, row)) for row in table["unknowns"]]
+        observed = map(tuple, np.asarray(table["observed"]).tolist())
+        for row, key in enumerate(zip(names, unknowns, times, observed, strict=True)):
+            if key not in seen:
+                seen.add(key)
+                continue
+            sd = math.sqrt(float(np.asarray(table["precision"][row]).diagonal().max()))
+            # The unit of the last decimal of the value with the most decimals.
+            decimals = (repr(value).partition("e")[0].partition(".")[2].rstrip("0") for value in key[3])
+            if 10.0 ** -max(map(len, decimals)) < ROUNDED * sd:
+                yield f"{columns.label} {' - '.join(key[0][0] + key[0][1])}"

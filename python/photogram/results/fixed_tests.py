@@ -172,19 +172,7 @@ def fall_by_lens(result: Result, images: Bools) -> float:
     if result.loss or not result.WHOLE or not is_suspected(result):
         return 0.0
     block, own = result.block, images & result.used_images
-    columns = lens_partials(result, own)
-    used = result.used_images[:, np.newaxis]
-    residuals: Floats = np.where(used, result.residuals / block.image_sd, 0.0)
-    factor = result._factor()
-    for count in (len(columns), 4, 2):
-        if (found := score(factor, columns[:count], residuals)) is not None:
-            return found
-    return 0.0
-
-
-def lens_partials(result: Result, own: Bools) -> Floats:
-    """(7, m, 2) partials of `own` images by typical lens parameters, in sd."""
-    block = result.block
+    # Partials of these images by typical lens parameters, in standard deviations.
     xy = focal_images(block)[own]
     low, high = xy.min(axis=0), xy.max(axis=0)
     x, y = ((xy - (low + high) / 2) / max(float((high - low).max()) / 2, 1e-300)).T
@@ -196,7 +184,13 @@ def lens_partials(result: Result, own: Bools) -> Floats:
     ]
     columns = np.zeros((len(terms), *block.image_xy.shape))
     columns[:, own] = np.array(terms).transpose(0, 2, 1) / block.image_sd[own]
-    return columns
+    used = result.used_images[:, np.newaxis]
+    residuals: Floats = np.where(used, result.residuals / block.image_sd, 0.0)
+    factor = result._factor()
+    for count in (len(columns), 4, 2):
+        if (found := score(factor, columns[:count], residuals)) is not None:
+            return found
+    return 0.0
 
 
 def how_to_calibrate(block: Block) -> Phrase | None:

@@ -113,14 +113,28 @@ def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
     weights.
     """
     if isinstance(groups, Mapping):
-        labels = _own(of, groups)
+        labels, parents = _own(of, groups)
     else:
         bases = tuple(groups) if isinstance(groups, list | tuple) else (groups,)
         for basis in bases or (None,):
             if not isinstance(basis, str) or basis not in BASES:
                 raise argument_error("groups", "choice", names=[*BASES], value=value_field(basis))
-        labels = _by(of, bases)
-    return _numbered(of, *labels)
+        labels, parents = _by(of, bases)
+    # Numbers of the groups, first those of images
+    numbers, found, counts = {"": -1}, dict[str, Indices](), list[int]()
+    for part, (names, codes) in labels.items():
+        used: Any = {"points": of.point_observed, "photos": of.photo_observed}.get(part, ...)
+        # In the order of the photos, independent of the order of the images.
+        order = np.argsort(of.given.image_photos, kind="stable") if part == "images" else used
+        for code in by_occurrence(codes[order].ravel()).tolist():
+            numbers.setdefault(names[code], len(numbers) - 1)
+        found[part] = np.full(codes.shape, -1, dtype=np.int64)
+        found[part][used] = np.array([numbers.get(name, -1) for name in names], np.int64)[codes[used]]
+        counts.append(len(numbers) - 1)
+    known = tuple(name for name in numbers if name)
+    larger = tuple(parents.get(name, "") for name in known)
+    named = GroupsOf(known, larger, tuple(number < counts[0] for number in range(len(known))))
+    return Grouping(named, **found, commons=of.commons, cameras=len(of.camera_names), records=of.records)
 
 
 _Labelled = tuple[dict[str, _Labels], dict[str, str]]
@@ -187,39 +201,6 @@ def _own(of: Observables, given: Mapping[str, Any]) -> _Labelled:
             codes = {text: code for code, text in enumerate(dict.fromkeys(texts))}
             labels[part] = [*codes], np.array([codes[text] for text in texts], np.int64).reshape(own.shape)
     return labels, parents
-
-
-def _numbered(of: Observables, labels: dict[str, _Labels], parents: dict[str, str]) -> Grouping:
-    """Assign numbers to the groups, first those of images."""
-    numbers: dict[str, int] = {"": -1}
-
-    def enter(names: Sequence[str], codes: Indices) -> None:
-        for code in by_occurrence(codes.ravel()).tolist():
-            numbers.setdefault(names[code], len(numbers) - 1)
-
-    def number(part: str, used: Any = ...) -> Indices:
-        names, codes = labels[part]
-        enter(names, codes[used])
-        found = np.full(codes.shape, -1, dtype=np.int64)
-        found[used] = np.array([numbers.get(name, -1) for name in names], dtype=np.int64)[codes[used]]
-        return found
-
-    # In the order of the photos, independent of the order of the images.
-    names, codes = labels["images"]
-    enter(names, codes[np.argsort(of.given.image_photos, kind="stable")])
-    images = number("images")
-    of_images = len(numbers) - 1
-    points, photos = number("points", of.point_observed), number("photos", of.photo_observed)
-    observations = number("observations")
-    known = tuple(name for name in numbers if name)
-    groups = GroupsOf(
-        known,
-        tuple(parents.get(name, "") for name in known),
-        tuple(number < of_images for number in range(len(known))),
-    )
-    return Grouping(
-        groups, images, points, photos, observations, of.commons, len(of.camera_names), of.records
-    )
 
 
 def observables(network: object) -> Observables:

@@ -121,19 +121,9 @@ def hypotheses(
         by_one = _log_odds(of_checks, dimension, dimension + 1, len(dimension))
         checked = max(checked, float(by_one.max()))
     sets = len(found["sets"])
-    same = (
-        "correlations",
-        "index",
-        "component",
-        "probability",
-        "estimate",
-        "redundancy",
-        "mdb",
-        "bias_to_noise",
-        "sets",
-    )
     every = Hypotheses(
-        **{name: found[name] for name in same},
+        **{name: found[name] for name in ("correlations", "index", "component", "sets", "probability")},
+        **{name: found[name] for name in ("estimate", "redundancy", "mdb", "bias_to_noise")},
         code=np.array(found["code"], dtype=np.str_),
         group=groups,
         rank=found["rank"].astype(np.int64),

@@ -23,7 +23,6 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import argument_error, value_field
 from photogram.arguments.objects import require_name
-from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.motion import focal_images
@@ -172,7 +171,15 @@ def terms_test(result: Result, names: Sequence[str], *, camera: str | None = Non
         raise InputError(phrase("models.fixed", names=list(names), camera=found.name))
     if not np.isfinite(found.cofactors[np.ix_(rows, rows)]).all():
         raise InputError(phrase("models.no-covariances"))
-    return replace(joint_test(result, found, names), effect=_largest_effect(result, found, rows))
+    effect, own = math.nan, rows_of_images(result, found)  # The largest effect on an image, in its sd
+    if own.size:
+        own = own[np.unique(np.linspace(0, own.size - 1, SEEN).round().astype(np.int64))]
+        without = {**found.camera.parameters, **dict.fromkeys((found.names[row] for row in rows), 0.0)}
+        measured = focal_images(result.block)[own]
+        other = found.camera.replace(parameters=without, sd=0.0, covariance=None)
+        moved = np.abs(other.project(found.camera.rays(measured)) - measured) / result.block.image_sd[own]
+        effect = float(np.nanmax(moved)) if np.isfinite(moved).any() else math.nan
+    return replace(joint_test(result, found, names), effect=effect)
 
 
 def joint_test(result: Result, camera: AdjustedCamera, names: Sequence[str]) -> TermsTest:
@@ -215,7 +222,17 @@ def score_test(
         found, rows = _camera(result, camera, names)
         if set(rows) & set(found.estimated):
             raise InputError(phrase("models.estimated", names=list(names), camera=found.name))
-        columns, title = _partials(result, found, rows), found.name
+        # Forward cameras compare measured with computed images, backward ones corrected with ideal images.
+        own, title = rows_of_images(result, found), found.name
+        plain = found.camera.replace(sd=0.0, covariance=None)
+        measured, residuals = focal_images(block)[own], result.residuals[own]
+        backward, reach = plain.direction == "backward", float(np.abs(measured).max(initial=1.0))
+        compared = compared_places(plain, measured if backward else measured - residuals)
+        columns = np.zeros((len(rows), m, 2))
+        columns[:, own] = (-1.0 if backward else 1.0) * partials_of(compared, plain, names, reach)
+        if backward and "c" in names:
+            columns[list(names).index("c"), own] += (compared(plain) - residuals) / plain.parameters["c"]
+        columns = np.nan_to_num(columns)
     else:
         columns = np.asarray(partials, dtype=np.float64)
         if columns.ndim != 3 or columns.shape[1:] != (m, 2) or not np.isfinite(columns).all():
@@ -277,20 +294,6 @@ def compare(results: Mapping[str, Result], *, known: bool | None = None) -> Comp
     return Comparison(tuple(sorted(models, key=lambda each: each.bic)), taken, tuple(nested))
 
 
-def _largest_effect(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> float:
-    """Return the largest effect of camera terms on an image, in its sd."""
-    block, own = result.block, rows_of_images(result, camera)
-    if not own.size:
-        return math.nan
-    own = own[np.unique(np.linspace(0, own.size - 1, SEEN).round().astype(np.int64))]
-    without = {**camera.camera.parameters, **dict.fromkeys((camera.names[row] for row in rows), 0.0)}
-    measured = focal_images(block)[own]
-    rays = camera.camera.rays(measured)
-    other = camera.camera.replace(parameters=without, sd=0.0, covariance=None).project(rays)
-    moved = np.abs(other - measured) / block.image_sd[own]
-    return float(np.nanmax(moved)) if np.isfinite(moved).any() else math.nan
-
-
 def groups_of_terms(camera: AdjustedCamera) -> list[tuple[str, ...]]:
     """Return distortion terms that are used together: single powers of the radius, letters."""
     radial, others = [], dict[str, list[str]]()
@@ -303,23 +306,6 @@ def groups_of_terms(camera: AdjustedCamera) -> list[tuple[str, ...]]:
         else:
             others.setdefault(re.sub(r"[\d_]+$", "", name), []).append(name)
     return [(name,) for name in reversed(radial)] + [tuple(names) for names in others.values()]
-
-
-def _partials(result: Result, camera: AdjustedCamera, rows: Sequence[int]) -> Floats:
-    """Return (k, m, 2) numerical partials of compared coordinates by parameters.
-
-    Forward cameras compare measured with computed images, backward ones corrected with ideal images.
-    """
-    own, names = rows_of_images(result, camera), [camera.names[row] for row in rows]
-    columns = np.zeros((len(rows), len(result.block.image_xy), 2))
-    plain = camera.camera.replace(sd=0.0, covariance=None)
-    measured, residuals = focal_images(result.block)[own], result.residuals[own]
-    backward, reach = plain.direction == "backward", float(np.abs(measured).max(initial=1.0))
-    compared = compared_places(plain, measured if backward else measured - residuals)
-    columns[:, own] = (-1.0 if backward else 1.0) * partials_of(compared, plain, names, reach)
-    if backward and "c" in names:
-        columns[names.index("c"), own] += (compared(plain) - residuals) / plain.parameters["c"]
-    return np.nan_to_num(columns)
 
 
 def _camera(result: Result, name: str | None, terms: Sequence[str]) -> tuple[AdjustedCamera, list[int]]:

@@ -15,7 +15,6 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
-from photogram.network.observations import Observation
 from photogram.network.rays import local_axes
 from photogram.network.strips import strips_of
 from photogram.network.unadjusted import Given
@@ -89,24 +88,21 @@ class LostSupportError(Exception):
         self.photos = tuple(photos)
 
 
+@dataclass(eq=False)
 class NetworkTrial:
     """A network that can be adjusted without some of its observations."""
 
-    def __init__(
-        self,
-        core: _photocore.NetworkTrial,
-        suspects: NamedSuspects,
-        supported: Bools,
-        rough: float,
-        exact: float,
-        control: str,
-    ) -> None:
-        self.core, self.suspects, self.rough, self.exact = core, suspects, rough, exact
-        self.deviations: Floats = core.suspects.deviations
-        self.supported = supported  # (P,) whether the pose of a photo is determined without images
-        self.control = control  # Parts that may be removed alone: `whole`, `plan and height`, `components`
+    core: _photocore.NetworkTrial
+    suspects: NamedSuspects
+    supported: Bools  # (P,) whether the pose of a photo is determined without images
+    rough: float
+    exact: float
+    control: str  # Parts that may be removed alone: `whole`, `plan and height`, `components`
+    out: Out | None = None  # Observations that a robust loss removes
+
+    def __post_init__(self) -> None:
+        self.deviations: Floats = self.core.suspects.deviations
         self._tests: dict[str, np.ndarray] = {}
-        self.out: Out | None = None  # Observations that a robust loss removes
 
     def restart(self, core: _photocore.NetworkTrial) -> None:
         """Continue the same network from other initial values; its groups are unchanged."""
@@ -238,7 +234,7 @@ class NamedSuspects(ABC):
 
         A photo of which many images were removed is a type of its own.
         """
-        removed = self.with_any(rows)
+        removed = np.asarray(np.logical_or.reduceat(rows, self.row_starts[:-1]))
         found: dict[Text, tuple[int, int]] = {}
         for kind in np.unique(self.kinds[removed]).tolist():
             own = np.flatnonzero((self.kinds == kind) & (used | removed))
@@ -246,30 +242,16 @@ class NamedSuspects(ABC):
             for each in dict.fromkeys(types[removed[own]].tolist()):
                 same = types == each
                 found[each] = (int(removed[own][same].sum()), int(same.sum()))
-        return {**found, **self._of_photos(removed, used | removed)}
-
-    def _of_photos(self, removed: Bools, used: Bools) -> dict[Text, tuple[int, int]]:
-        """Return these numbers of images of photos that lost many of them, but not all."""
-        images = (self.kinds == IMAGE) & used
-        count = len(self.given.photo_ids)
-        all_ = np.bincount(self.photos[images], minlength=count)
-        lost = np.bincount(self.photos[images & removed], minlength=count)
-        many = np.flatnonzero((lost >= MANY) & (lost > MOST_OF_PHOTO * all_) & (lost < all_))
-        return {
-            phrase("test.images_of", photo=str(self.given.photo_ids[photo])): (
-                int(lost[photo]),
-                int(all_[photo]),
-            )
-            for photo in many.tolist()
-        }
+        images, count = (self.kinds == IMAGE) & (used | removed), len(self.given.photo_ids)
+        every, lost = (np.bincount(self.photos[own], minlength=count) for own in (images, images & removed))
+        for photo in np.flatnonzero((lost >= MANY) & (lost > MOST_OF_PHOTO * every) & (lost < every)):
+            name = phrase("test.images_of", photo=str(self.given.photo_ids[photo]))
+            found[name] = int(lost[photo]), int(every[photo])
+        return found
 
     def of_images(self, images: Indices) -> Indices:
         """Return the groups of images; images without intersection have none."""
         return np.flatnonzero((self.kinds == IMAGE) & np.isin(self.subjects, images))
-
-    def with_any(self, rows: Bools) -> Bools:
-        """Return (G,) groups with any of some rows."""
-        return np.asarray(np.logical_or.reduceat(rows, self.row_starts[:-1]))
 
     def type(self, kind: int, subject: int) -> Phrase:
         """Return the name of the type of a group, in the plural."""
@@ -326,11 +308,6 @@ def network_trial(
     )
 
 
-def observations_of_core(block: Block) -> list[Observation]:
-    """Return the additional observations in the order of the core: by type."""
-    return [each for own in block.observations.columns for each in own.objects]
-
-
 class BlockSuspects(NamedSuspects):
     """The observation groups of a block."""
 
@@ -340,7 +317,8 @@ class BlockSuspects(NamedSuspects):
         lengths = (plan, plan, block.linear_unit)
         super().__init__(block, core, components=(axes, axes, ANGLES), lengths=lengths)
         self.block = block
-        self.observations = observations_of_core(block)
+        # The additional observations in the order of the core: by type
+        self.observations = [each for own in block.observations.columns for each in own.objects]
 
     def touched(self, group: int) -> tuple[list[int], list[int]]:
         if self.kinds[group] != OBSERVATION:

@@ -66,25 +66,34 @@ def patterns(
     """
     used = chosen(result.used_images & finite_rows(result.redundancy))
     w = np.where(result.redundancy > TESTABLE, result.standardized, math.nan)[used]
-    if not np.isfinite(w).any():
-        return []
-    if not (factor := float(np.nanmedian(np.abs(w))) / MEDIAN) > 0:
+    if not np.isfinite(w).any() or not (factor := float(np.nanmedian(np.abs(w))) / MEDIAN) > 0:
         return []
     # ~v = w sqrt(r) of clipped w; 0 if untested.
     redundancy = np.where(np.isfinite(w), result.redundancy[used], 0.0)
     residuals = _clipped(w, redundancy, factor)
     given, (axis, _) = result.given, result._terms.image_axes
     # Tests by photo use measured coordinates: samples and lines for scanners.
-    image_photos, xy, measured = given.image_photos, focal_images(given), given.image_xy
+    photos, xy, measured = given.image_photos[used], focal_images(given)[used], given.image_xy[used]
     scale = factor * given.image_sd[used].T.copy().mean(axis=1) * axis.factor
-    found: list[Systematic | None] = [
-        _of_camera(each, image_photos[used], xy[used], residuals, redundancy, scale, axis.small)
-        for each in cameras
-    ]
-    for row, (each, camera) in enumerate(zip(found, cameras, strict=True)):
-        if each is not None and each.significant and each.large:
-            found[row] = replace(each, fall=fall(camera.photos[image_photos]))
-    found.append(_of_photos(image_photos[used], given.photo_ids, measured[used], residuals, redundancy))
+    found = list[Systematic | None]()
+    for camera in cameras:
+        own = chosen(camera.photos[photos])
+        pattern = fits.frame_pattern(xy[own], residuals[own], redundancy[own], camera.estimated)
+        if pattern is None:
+            continue
+        dx, dy = (float(each * size) for each, size in zip(pattern.largest, scale.tolist(), strict=True))
+        fields = {"camera": camera.name, "rms": float(pattern.rms), "dx": dx, "dy": dy, "unit": axis.small}
+        place = {"x": float(pattern.at[0]), "y": float(pattern.at[1])}
+        sentence, kind = (
+            Phrase("pattern.frame", fields | place),
+            Phrase("test.frame", {"camera": camera.name}),
+        )
+        test = "B", "chi2", (pattern.dof,), pattern.statistic, pattern.probability, LEVEL_OF_PATTERNS
+        systematic = Systematic(kind, sentence, *test, large=pattern.rms > NOTABLE)
+        if systematic.significant and systematic.large:
+            systematic = replace(systematic, fall=fall(camera.photos[given.image_photos]))
+        found.append(systematic)
+    found.append(_of_photos(photos, given.photo_ids, measured, residuals, redundancy))
     found.append(_distribution(result, used))
     if axes:
         # Weighted observed positions may drift along the order of the photos.
@@ -117,30 +126,6 @@ def block_patterns(result: Result) -> list[Systematic]:
 
 def _clipped(w: Floats, redundancy: Floats, factor: float) -> Floats:
     return np.asarray(np.nan_to_num(np.clip(w / factor, -CLIPPED, CLIPPED)) * np.sqrt(redundancy))
-
-
-def _of_camera(
-    camera: CameraImages,
-    image_photos: Indices,
-    xy: Floats,
-    residuals: Floats,
-    redundancy: Floats,
-    scale: Floats,
-    unit: str,
-) -> Systematic | None:
-    own = chosen(camera.photos[image_photos])
-    found = fits.frame_pattern(xy[own], residuals[own], redundancy[own], camera.estimated)
-    if found is None:
-        return None
-    x, y = (each * size for each, size in zip(found.largest, scale.tolist(), strict=True))
-    place = {"x": float(found.at[0]), "y": float(found.at[1])}
-    fields = {"camera": camera.name, "rms": float(found.rms), "dx": float(x), "dy": float(y), "unit": unit}
-    sentence, kind = (
-        Phrase("pattern.frame", {**fields, **place}),
-        Phrase("test.frame", {"camera": camera.name}),
-    )
-    test = "B", "chi2", (found.dof,), found.statistic, found.probability, LEVEL_OF_PATTERNS
-    return Systematic(kind, sentence, *test, large=found.rms > NOTABLE)
 
 
 def _of_photos(

@@ -102,8 +102,17 @@ class ReliabilitySummary:
 
 
 def listed(found: Reliability, unit: str, *, heights: bool) -> Listed:
-    tests = found.tests
-    two, points = _points(found.suspects, tests)
+    tests, at = found.tests, found.suspects.points
+    # Points on two photos, and points with possible pairs.
+    takes_part, size = tests.active & (at >= 0), int(at.max(initial=-1)) + 1
+    rays = np.bincount(at[takes_part & (found.suspects.kinds == 0)], minlength=size)
+    others = np.bincount(at[takes_part], minlength=size) - rays
+    weak = takes_part & ~(tests.least > APART)
+    least: Floats = np.full(size, math.inf)
+    np.minimum.at(least, at[weak], np.nan_to_num(tests.least[weak]))
+    two = (rays == 2) & (others == 0)
+    several: Indices = np.flatnonzero((np.bincount(at[weak], minlength=size) > 1) & ~two)
+    points = several[np.argsort(least[several], kind="stable")][:LOOKED_INTO].tolist()
     checked = tests.least > TESTABLE
     pairs = found.trial.core.inseparable(points, LIMIT)
     first, second, rho = (each[checked[pairs[0]] & checked[pairs[1]]] for each in pairs)
@@ -113,7 +122,7 @@ def listed(found: Reliability, unit: str, *, heights: bool) -> Listed:
     return Listed(
         kinds=_kinds(found),
         weakest=_weakest(found, unit, heights=heights),
-        two_rays=two,
+        two_rays=int(two.sum()),
         pairs=tuple(found.named(*pair) for pair in named),
         pairs_found=len(rho),
         points_looked_into=len(points),
@@ -166,22 +175,3 @@ def _weakest(found: Reliability, unit: str, *, heights: bool) -> Table:
         column("own_point", own_points, f"Own point {unit}".rstrip(), decimals=4),
     ]
     return Table("reliability.weakest", "Largest undetected errors", columns, note)
-
-
-def _points(suspects: NamedSuspects, tests: Tests) -> tuple[int, list[int]]:
-    """Return the number of two-ray points, and points with possible pairs."""
-    at = suspects.points
-    takes_part = tests.active & (at >= 0)
-    if not takes_part.any():
-        return 0, []
-    size = int(at.max()) + 1
-    images = takes_part & (suspects.kinds == 0)
-    rays = np.bincount(at[images], minlength=size)
-    others = np.bincount(at[takes_part], minlength=size) - rays
-    weak = takes_part & ~(tests.least > APART)
-    least: Floats = np.full(size, math.inf)
-    np.minimum.at(least, at[weak], np.nan_to_num(tests.least[weak]))
-    two = (rays == 2) & (others == 0)
-    several: Indices = np.flatnonzero((np.bincount(at[weak], minlength=size) > 1) & ~two)
-    order = np.argsort(least[several], kind="stable")[:LOOKED_INTO]
-    return int(two.sum()), several[order].tolist()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -87,8 +87,17 @@ class Snooped(Documented):
         """Return the log as a data frame, a row for each removed component, with its unit."""
         import pandas as pd
 
-        entries = zip(self.log, records(log_table(self.log).columns), strict=True)
-        rows = [row for entry, member in entries for row in _rows(entry, member)]
+        rows, names = list[dict[str, Any]](), ("component", "unit", "error", "error_sd", "predicted_error")
+        for entry, member in zip(self.log, records(log_table(self.log).columns), strict=True):
+            common = {name: math.nan if value is None else value for name, value in member.items()} | {
+                "rivals": rivals_of(entry.rivals, 3),
+                "consequences": "; ".join(member["consequences"]),
+                "returned": entry.returned,
+                "kept": str(entry.kept),
+            }
+            predicted = entry.prediction_error or (math.nan,) * len(entry.rows)
+            parts = zip(entry.components, entry.units, entry.error, entry.error_sd, predicted, strict=True)
+            rows += [common | dict(zip(names, part, strict=True)) for part in parts]
         return pd.DataFrame(rows, columns=list(_COLUMNS))
 
     def _members(self) -> dict[str, Any]:
@@ -125,8 +134,19 @@ class Snooped(Documented):
             *(f"{each.sentence}: {each.reason}" for each in self.exchanged),
             *(f"{each.name}: {line}" for each in log for line in each.consequences),
         ]
+        tests = [
+            of_each(log, "name", kind="name", head="What"),
+            of_each(log, "first_statistic", head="T at first", decimals=2),
+            of_each(log, "statistic", head="T", decimals=2),
+            of_each(log, "dimension", head="Dimension", decimals=0),
+            of_each(log, "fisher", head="F", decimals=2),
+            of_each(log, "log10_p", head="log10 p", decimals=1),
+            Quantity([math.log10(each.limit) for each in log], head="Limit", decimals=1),
+            of_each(log, "prediction", head="T against the rest", decimals=2),
+            of_each(log, "prediction_log10_p", head="log10 p", decimals=1),
+        ]
         parts: list[Part] = [Facts("Data snooping", self._facts())]
-        parts += [log_table(log), _tests_table(log)]
+        parts += [log_table(log), Table("removed-tests", "Tests", for_people(tests))]
         parts += [Remarks(remarks)] if remarks else []
         section = Section("removed", "What was taken out", parts, about("removed"))
         note = about("removed.groups", n=len(self.suspects))
@@ -183,21 +203,6 @@ _COLUMNS = (
 )
 
 
-def _rows(entry: Removal, member: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return a row for each component: the member of the document with its own values."""
-    common = {
-        **{name: math.nan if value is None else value for name, value in member.items()},
-        "rivals": rivals_of(entry.rivals, 3),
-        "consequences": "; ".join(member["consequences"]),
-        "returned": entry.returned,
-        "kept": str(entry.kept),
-    }
-    names = ("component", "unit", "error", "error_sd", "predicted_error")
-    predicted = entry.prediction_error or (math.nan,) * len(entry.rows)
-    rows = zip(entry.components, entry.units, entry.error, entry.error_sd, predicted, strict=True)
-    return [common | dict(zip(names, row, strict=True)) for row in rows]
-
-
 def log_table(log: Sequence[Removal]) -> Table:
     rivals = [
         [members(one, "name", T="statistic") | members(one, "dimension", "odds") for one in each.rivals]
@@ -223,21 +228,6 @@ def log_table(log: Sequence[Removal]) -> Table:
         Quantity(states, kind="name", head="Now"),
     ]
     return Table("snooping.log", "In order", columns)
-
-
-def _tests_table(log: Sequence[Removal]) -> Table:
-    columns = [
-        of_each(log, "name", kind="name", head="What"),
-        of_each(log, "first_statistic", head="T at first", decimals=2),
-        of_each(log, "statistic", head="T", decimals=2),
-        of_each(log, "dimension", head="Dimension", decimals=0),
-        of_each(log, "fisher", head="F", decimals=2),
-        of_each(log, "log10_p", head="log10 p", decimals=1),
-        Quantity([math.log10(each.limit) for each in log], head="Limit", decimals=1),
-        of_each(log, "prediction", head="T against the rest", decimals=2),
-        of_each(log, "prediction_log10_p", head="log10 p", decimals=1),
-    ]
-    return Table("removed-tests", "Tests", for_people(columns))
 
 
 _STANDING = ("status", "weighted_sum_of_squares", "degrees_of_freedom")

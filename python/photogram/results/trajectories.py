@@ -295,7 +295,14 @@ def _correction(
 ) -> tuple[str, int, float, float, float, float, float]:
     """Return basis, coefficients, span, largest correction and time, largest test."""
     first, last = trajectory.table.span
-    times, values = _times(basis, first, last), np.array([each.position for each in own])
+    if isinstance(basis, Polynomial):  # Some times for each coefficient
+        times = np.linspace(first, last, STEPS * basis.count + 1) if last > first else np.array([first])
+    else:  # Some times in each interval of knots
+        knots, p = np.asarray(basis.knots, dtype=float), basis.degree
+        inner = np.clip(np.unique(knots[p : len(knots) - p]), first, last)
+        parts = (np.arange(STEPS) / STEPS)[:, np.newaxis]
+        times = np.unique(np.append(((1 - parts) * inner[:-1] + parts * inner[1:]).ravel(), inner[-1]))
+    values = np.array([each.position for each in own])
     # The others do not count.
     none = [np.zeros((len(each), 3)) for each in trajectory.coefficients]
     none[part] = values
@@ -305,16 +312,6 @@ def _correction(
     largest = float(np.nanmax(tests)) if np.isfinite(tests).any() else float("nan")
     name = phrase(f"about.basis.{type(basis).__name__.lower()}", degree=basis.degree)
     return str(name), len(own), first, last, float(sizes[worst]), float(times[worst]), largest
-
-
-def _times(basis: Basis, first: float, last: float) -> Floats:
-    """Return times over a span: some per knot interval, or per coefficient."""
-    if isinstance(basis, Polynomial):
-        return np.linspace(first, last, STEPS * basis.count + 1) if last > first else np.array([first])
-    knots, p = np.asarray(basis.knots, dtype=float), basis.degree
-    inner = np.clip(np.unique(knots[p : len(knots) - p]), first, last)
-    parts = (np.arange(STEPS) / STEPS)[:, np.newaxis]
-    return np.unique(np.append(((1 - parts) * inner[:-1] + parts * inner[1:]).ravel(), inner[-1]))
 
 
 _MANY = (Coefficient, Knot)  # Types with thousands of unknowns

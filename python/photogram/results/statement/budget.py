@@ -136,18 +136,17 @@ def budgets(
         share = 1.0 / variance if variance > 0 else 0.0
         freedom = freedom_of(squares, variance)
         sources = tuple(Source(*source, source[-1] * share) for source in rows.sources(squares))
-        largest, k = tuple(_largest(rows, squares, t, share)), coverage_factor(coverage, freedom.used)
+        most = np.sort(np.argpartition(-squares, min(LARGEST, len(squares)) - 1)[:LARGEST])
+        largest = tuple(
+            Single(rows.named(row), float(rows.sd[row]), float(t[row] / rows.sd[row]), own, own * share)
+            for row in most[np.argsort(-squares[most], kind="stable")].tolist()
+            if (own := float(squares[row])) > 0
+        )
+        k = coverage_factor(coverage, freedom.used)
         numbers = value, math.sqrt(variance), variance / result.covariance_scale
         names = each.name, each.subject, each.unit
         found.append(Budget(*names, *numbers, sources, largest, freedom, k, coverage))
     return found
-
-
-def _largest(rows: Rows, squares: Floats, t: Floats, share: float) -> Iterable[Single]:
-    most = np.sort(np.argpartition(-squares, min(LARGEST, len(squares)) - 1)[:LARGEST])
-    for row in most[np.argsort(-squares[most], kind="stable")].tolist():
-        if (own := float(squares[row])) > 0:
-            yield Single(rows.named(row), float(rows.sd[row]), float(t[row] / rows.sd[row]), own, own * share)
 
 
 def budget_fields(texts: Texts, found: Budget) -> dict[str, Any]:
@@ -406,21 +405,20 @@ def _distance(result: Result, name: str, ends: tuple[str, str]) -> Wanted:
     spheroid = result.block.spheroid
 
     def between(x: Any, y: Any) -> Any:
-        if spheroid is not None:
-            x, y = (_geocentric(each, spheroid.a, spheroid.b) for each in (x, y))
-        return (((x - y) ** 2).sum()) ** 0.5
+        return (((geocentric(x) - geocentric(y)) ** 2).sum()) ** 0.5
+
+    def geocentric(x: Any) -> Any:  # Also of complex numbers
+        if spheroid is None:
+            return x
+        a, b = spheroid.a, spheroid.b
+        sp, cp = np.sin(x[1]), np.cos(x[1])
+        across = a / (1 - (1 - (b / a) ** 2) * sp**2) ** 0.5
+        level = (across + x[2]) * cp
+        return np.array([level * np.cos(x[0]), level * np.sin(x[0]), ((b / a) ** 2 * across + x[2]) * sp])
 
     items = tuple(("point", each) for each in ends)
     subject = Phrase("quantity.distance", {"of": " ".join(ends)})
     return Wanted(name, subject, items, between, result.block.linear_unit)
-
-
-def _geocentric(x: Any, a: float, b: float) -> Any:
-    """Return geocentric coordinates of geographic ones; also complex numbers."""
-    sp, cp = np.sin(x[1]), np.cos(x[1])
-    across = a / (1 - (1 - (b / a) ** 2) * sp**2) ** 0.5
-    level = (across + x[2]) * cp
-    return np.array([level * np.cos(x[0]), level * np.sin(x[0]), ((b / a) ** 2 * across + x[2]) * sp])
 
 
 def _linear(result: Result, gradients: Mapping[Any, Any]) -> Wanted:

@@ -183,9 +183,7 @@ def compared(result: Result, asked: Asked, covariances: Covariances) -> Compared
 
 def in_order(block: Block, rows: Indices) -> Indices:
     """Return points in natural order of their names."""
-    return np.array(
-        sorted(rows.tolist(), key=lambda row: natural_order(block.point_ids[row])), dtype=np.int64
-    )
+    return np.array(sorted(rows.tolist(), key=lambda row: natural_order(block.point_ids[row])), np.int64)
 
 
 def turned_to_east(block: Block, positions: Floats) -> Floats:
@@ -274,13 +272,8 @@ def _check_apart(block: Block, rows: Indices) -> None:
     for place, row in zip(checks, rows.tolist(), strict=True):
         near = np.linalg.norm(held - place, axis=1) < apart  # missing coordinates are not near any point
         if near.any():
-            raise InputError(
-                phrase(
-                    "request.same-place",
-                    point=block.point_ids[row],
-                    control=block.point_ids[control[near.argmax()]],
-                )
-            )
+            same = {"point": block.point_ids[row], "control": block.point_ids[control[near.argmax()]]}
+            raise InputError(phrase("request.same-place", **same))
 
 
 @dataclass(frozen=True)
@@ -358,9 +351,7 @@ def leave_one_out(result: Result) -> list[LeftOut]:
     """Return used control points predicted by the others, in order of names."""
     block, found = result.block, []
     observed = {each.point: each for each in block.observations.of_type(Control)}
-    held_by = np.asarray(np.isfinite(block.point_sd).any(axis=1))
-    held_by[[row for row, name in enumerate(block.point_ids) if name in observed]] = True
-    control = np.flatnonzero(result.used_points & held_by)
+    control = np.flatnonzero(result.used_points & (result.point_kinds == "control"))
     residuals = result.point_residuals
     for row in in_order(block, control).tolist():
         name, axes = block.point_ids[row], turned_to_east(block, result.point_positions[row : row + 1])[0]
@@ -457,22 +448,16 @@ def layout(points: Floats, extent: Floats, control: Floats) -> Layout | None:
     grid = low + (high - low) * np.stack(np.meshgrid(middles, middles), axis=-1).reshape(-1, 2)
     inside = grid[~outside(grid, hull(block))]
     far = _photocore.nearest_points(inside, own, FAR * diagonal) < 0
+    spacing, reach = math.nan, 1.001 * float(np.linalg.norm(np.ptp(own, axis=0)))
+    if len(own) > 1:
+        neighbours = _photocore.nearest_points(own, own, reach, np.arange(len(own))) if reach > 0 else 0
+        spacing = float(np.hypot(*(own - own[neighbours]).T).min())
     return Layout(
         len(own),
         diagonal,
         (float(quadrants[0]), float(quadrants[1]), float(quadrants[2]), float(quadrants[3])),
-        _least_spacing(own) / diagonal,
+        spacing / diagonal,
         float(np.mean(far)) if len(inside) else math.nan,
         float(np.ptp(known) / span) if known.size and span > 0 else math.nan,
         int(outside(own, hull(control[:, :2])).sum()) if len(control) else len(own),
     )
-
-
-def _least_spacing(plan: Floats) -> float:
-    if len(plan) < 2:
-        return math.nan
-    reach = 1.001 * float(np.linalg.norm(np.ptp(plan, axis=0)))
-    if not reach > 0:
-        return 0.0
-    neighbours = _photocore.nearest_points(plan, plan, reach, np.arange(len(plan)))
-    return float(np.hypot(*(plan - plan[neighbours]).T).min())

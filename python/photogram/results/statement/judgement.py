@@ -140,14 +140,8 @@ def _doubtful(of_all: Figures | None) -> bool:
     """Return whether check points are missing, or some test does not agree."""
     if of_all is None:
         return True
-    parts = [each for each in of_all.prediction.values() if each is not None]
-    shifts = [each for each in of_all.bias.values() if each is not None]
-    return (
-        any(each.rejected for each in parts)
-        or any(each.rejected for each in shifts)
-        or (of_all.surface is not None and of_all.surface.rejected)
-        or bool(of_all.points.wrong.any())
-    )
+    tests = (*of_all.prediction.values(), *of_all.bias.values(), of_all.surface)
+    return any(test and test.rejected for test in tests) or bool(of_all.points.wrong.any())
 
 
 def _asprs(of: Statement) -> Iterator[Sentence]:
@@ -249,7 +243,7 @@ def _factor(factor: float, interval: tuple[float, float]) -> dict[str, Any]:
 def _remarks(found: Statement) -> Iterator[Sentence]:
     texts, of_all, standards = found.texts, found.of_all, found.standards
     for name, code in found.compared.not_usable[:NAMED]:
-        yield "unusable", {"point": name, "reason": texts.word("reason", code)}
+        yield "unusable", {"point": name, "reason": texts(f"reason.{code}")}
     for key in texts.missing:
         yield "language.missing", {"sentence": key}
     if not found.result.photo_given_sd.any():
@@ -320,7 +314,16 @@ def _assumptions(found: Statement) -> Iterator[Sentence]:
         yield "assume.read", {"said": each}
     yield from _adjustment(found)
     if len(found.compared):
-        yield from _survey(found)
+        sd = found.compared.survey_sd
+        if not sd[np.isfinite(sd)].any():
+            yield "assume.survey_exact", {}
+        else:
+            roots = (root_mean(column**2) for column in sd.T)
+            yield "assume.survey", dict(zip(("east", "north", "height"), roots, strict=True))
+        if any(asked.survey_common_sd):
+            size = " / ".join(texts.length(each) for each in asked.survey_common_sd)
+            yield f"assume.common{'_cancels' if asked.survey_common_in_control else ''}", {"size": size}
+        yield f"assume.independent.{asked.independent or 'undeclared'}", {}
         if found.compared.step > 1:
             yield "assume.taken", {"all": found.compared.known, "step": found.compared.step}
         yield "assume.heights", {}
@@ -368,19 +371,6 @@ def _adjustment(found: Statement) -> Iterator[Sentence]:
     frame = f"{texts.text(block.frame.phrase)}, {block.linear_unit}"
     yield "assume.datum", {"datum": result.datum.phrase, "frame": frame}
     yield "assume.refraction", {"refraction": (block.refraction or Refraction()).phrase(block.linear_unit)}
-
-
-def _survey(found: Statement) -> Iterator[Sentence]:
-    asked, texts, sd = found.asked, found.texts, found.compared.survey_sd
-    if not sd[np.isfinite(sd)].any():
-        yield "assume.survey_exact", {}
-    else:
-        roots = (root_mean(column**2) for column in sd.T)
-        yield "assume.survey", dict(zip(("east", "north", "height"), roots, strict=True))
-    if any(asked.survey_common_sd):
-        size = " / ".join(texts.length(each) for each in asked.survey_common_sd)
-        yield f"assume.common{'_cancels' if asked.survey_common_in_control else ''}", {"size": size}
-    yield f"assume.independent.{asked.independent or 'undeclared'}", {}
 
 
 def fixed_values(texts: Texts, result: Result) -> str:

@@ -13,7 +13,7 @@ from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import replace
 from photogram.network.hull import hull, outside
 from photogram.results.distortion import distortion_curve, observed_rows
-from photogram.results.features import Features, quantity_columns, through, unit_deviations
+from photogram.results.features import quantity_columns, through, unit_deviations
 from photogram.results.footprints import footprints
 from photogram.results.network_sections import fit_of_images
 from photogram.results.parts import AdjustedCamera
@@ -196,9 +196,7 @@ def _survey(statement: Statement) -> list[Table]:
     texts, columns, own = statement.texts, declared.Columns(statement.texts), statement.survey
     decimals = max(3, declared.decimals_for(own.sd))
     coordinates = [
-        columns.number(
-            texts.word("axis", name), column, 8 if unit == "deg" else decimals, texts.word("unit", unit)
-        )
+        columns.number(texts(f"axis.{name}"), column, 8 if unit == "deg" else decimals, texts(f"unit.{unit}"))
         for (name, unit), column in zip(own.system.axes, own.positions.T, strict=True)
     ]
     quantities = [
@@ -228,30 +226,24 @@ def _metrology(statement: Statement) -> list[Part]:
     texts, parts = statement.texts, list[Part]()
     lengths, features = statement.standards.lengths, statement.result.features
     if features is not None and len(features):
-        parts.append(_features(texts, features))
+        # Two figures of the least deviation per unit
+        every = [(feature, own) for feature in features for own in feature.quantities]
+        names = [f"{feature.name}: {texts.text(through(feature))}" for feature, _ in every]
+        columns, of = declared.Columns(texts), quantity_columns(features)
+        quantities = [
+            columns.text("feature", names),
+            columns.text("quantity", [texts(f"measured.{own.name}") for _, own in every]),
+            *(replace(named(of, key), head=columns.head(key)) for key in ("value", "sd", "expanded")),
+            columns.text(declared.BLANK, [own.unit for _, own in every]),
+        ]
+        note, by = f"k = {texts.number(features.k, 2)}", unit_deviations(features)
+        parts.append(Table("features", texts("table.features"), quantities, note, deviations=by))
     if lengths is not None:
         sketch, caption = partial(drawn_lengths, lengths, texts), texts("picture.lengths.caption")
         drawing = Drawing("lengths", texts("picture.lengths"), caption, sketch)
         parts += [declared.test_lengths(texts, lengths), drawing]
     measures = [declared.quality_measures(statement)] if statement.standards.iso_19157 else []
     return [*parts, *measures]
-
-
-def _features(texts: Texts, features: Features) -> Table:
-    """Return feature quantities with two figures of the least deviation per unit."""
-    columns = declared.Columns(texts)
-    every = [(feature, own) for feature in features for own in feature.quantities]
-    names = [f"{feature.name}: {texts.text(through(feature))}" for feature, _ in every]
-    table = quantity_columns(features)
-    numbers = [replace(named(table, key), head=columns.head(key)) for key in ("value", "sd", "expanded")]
-    quantities = [
-        columns.text("feature", names),
-        columns.text("quantity", [texts.word("measured", own.name) for _, own in every]),
-        *numbers,
-        columns.text(declared.BLANK, [own.unit for _, own in every]),
-    ]
-    note = f"k = {texts.number(features.k, 2)}"
-    return Table("features", texts("table.features"), quantities, note, deviations=unit_deviations(features))
 
 
 _CLASSES = {"h": "v", "plan": "h", "all": "3d"}  # Parts of the components with classes

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.arrays import names, number, numbers, one_of, truth_value, value_field
-from photogram.arguments.objects import require_name
+from photogram.arguments.objects import require_kind, require_name
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.results.components import VarianceComponents
@@ -89,12 +89,6 @@ def _length(name: str, value: Any) -> dict[str, Any]:
     return {"line": line, "from": first, "to": last, **figures}
 
 
-def _components(name: str, value: object) -> object:
-    if not isinstance(value, VarianceComponents):
-        raise invalid(name, "error.kind", value, kind="VarianceComponents")
-    return value
-
-
 def _option(check: Callable[..., Any], **default: Any) -> Any:
     """Return the field of an option with the check of its value; without default it is None."""
     return field(metadata={"check": check}, **(default or {"default": None}))
@@ -160,7 +154,7 @@ class Asked:
         lambda name, value: (value,) if isinstance(value, str | Mapping) else tuple(_sequence(name, value))
     )
     coverage: float = _option(number, default=0.95)
-    components: VarianceComponents | None = _option(_components)
+    components: VarianceComponents | None = _option(partial(require_kind, kind=VarianceComponents))
     lengths: tuple[Mapping[str, Any], ...] = _option(
         lambda name, value: tuple(
             _length(f"{name}[{row}]", each) for row, each in enumerate(_sequence(name, value))
@@ -185,25 +179,22 @@ class Asked:
         values = {name: value for name, value in options.items() if value is not None}
         checks = {name: known[name].metadata.get("check", _text) for name in values}
         asked = cls(**{name: checks[name](name, value) for name, value in values.items()})
-        asked._check()
-        return asked
-
-    def _check(self) -> None:
-        for standard in self.standards:
+        for standard in asked.standards:
             require_name("standard", standard, STANDARDS)
-        for name in self.classes:
+        for name in asked.classes:
             one_of("a class", name, ("h", "v", "3d"))
-        if self.independent is not None:
-            one_of("independent", self.independent, INDEPENDENT)
-        if not 0 < self.coverage < 1:
-            raise invalid("coverage", "error.range", self.coverage, low=0, high=1)
-        if self.expansion is not None and not math.isfinite(self.expansion):
-            raise invalid("expansion", "error.finite", self.expansion)
-        if "vdi-2634" in self.standards and not self.lengths:
+        if asked.independent is not None:
+            one_of("independent", asked.independent, INDEPENDENT)
+        if not 0 < asked.coverage < 1:
+            raise invalid("coverage", "error.range", asked.coverage, low=0, high=1)
+        if asked.expansion is not None and not math.isfinite(asked.expansion):
+            raise invalid("expansion", "error.finite", asked.expansion)
+        if "vdi-2634" in asked.standards and not asked.lengths:
             raise InputError(phrase("error.requires", name="vdi-2634", other=phrase("request.lengths")))
-        for point, reason in self.without.items():
+        for point, reason in asked.without.items():
             if not reason.strip():
                 raise InputError(phrase("request.reason", point=point))
+        return asked
 
 
 def lengths_in(unit: str) -> float:

@@ -184,21 +184,8 @@ def files_of_statement(statement: Statement) -> dict[str, bytes]:
     for name, code in statement.compared.not_usable:
         values = {"point": name, "used": "no", "reason": str(phrase(f"reason.{code}")), "cover": ""}
         columns = {key: [*column, values.get(key, math.nan)] for key, column in columns.items()}
-    files = {
-        "check_points.csv": csv_text(columns, [about("statement.check-points", unit=unit)]),
-        "budget.csv": _budget_file(statement.taken_apart),
-    }
-    if statement.left_out:
-        left_out = frame(left_out_points(statement.texts, statement.left_out).columns)
-        files["leave_one_out.csv"] = csv_text(left_out, [about("statement.leave-one-out", unit=unit)])
-    if statement.removed:
-        files["removed.csv"] = removed_observations(statement).csv()
-    return files
-
-
-def _budget_file(budgets: Sequence[Budget]) -> bytes:
-    rows: list[dict[str, Any]] = []
-    for each in budgets:
+    rows = list[dict[str, Any]]()
+    for each in statement.taken_apart:
         head = {"quantity": each.quantity, "unit": each.unit, "value": each.value, "u": each.sd}
         basis = "estimated" if each.freedom.basis == "components" else "given"
         for own in each.sources:
@@ -210,11 +197,23 @@ def _budget_file(budgets: Sequence[Budget]) -> bytes:
             found = {"level": "observation", "source": " ".join(one.observation), "number": 1}
             found |= {"u_k": math.sqrt(one.contribution), **members(one, "share", "sensitivity", "sd")}
             rows.append({**head, **found, "taken_from": basis})
-    names = (
-        *("quantity", "unit", "value", "u", "level", "source", "number", "u_k", "share"),
-        *("sensitivity", "sd", "dof", "taken_from"),
-    )
-    return csv_text({name: [row.get(name, math.nan) for row in rows] for name in names}, [])
+    budgets = {name: [row.get(name, math.nan) for row in rows] for name in _OF_BUDGET}
+    files = {
+        "check_points.csv": csv_text(columns, [about("statement.check-points", unit=unit)]),
+        "budget.csv": csv_text(budgets, []),
+    }
+    if statement.left_out:
+        left_out = frame(left_out_points(statement.texts, statement.left_out).columns)
+        files["leave_one_out.csv"] = csv_text(left_out, [about("statement.leave-one-out", unit=unit)])
+    if statement.removed:
+        files["removed.csv"] = removed_observations(statement).csv()
+    return files
+
+
+_OF_BUDGET = (
+    *("quantity", "unit", "value", "u", "level", "source", "number", "u_k", "share"),
+    *("sensitivity", "sd", "dof", "taken_from"),
+)
 
 
 def statement_members(found: Statement) -> dict[str, Any]:

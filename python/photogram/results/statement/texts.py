@@ -128,24 +128,20 @@ class Texts(Words):
             return given
         return self._table["date"].format(year=day.year, month=f"{day.month:02}", day=f"{day.day:02}")
 
-    def word(self, family: str, name: str, **count: int) -> str:
-        """Return a word of another module in the language; without a key unchanged."""
-        return self(f"{family}.{name}", **count)
-
     def kind(self, name: str) -> str:
         """Return the plural of a type: `images`, `prior, lever arm`, ..."""
         names = []
         for part in name.split(", "):
             count, blank, rest = part.partition(" ")
-            counted = f"{count} {self.word('kind', rest)}" if blank and count.isdigit() else ""
-            names.append(counted or self.word("kind", part))
+            counted = f"{count} {self(f'kind.{rest}')}" if blank and count.isdigit() else ""
+            names.append(counted or self(f"kind.{part}"))
         return ", ".join(names)
 
     def observation(self, parts: Sequence[str]) -> str:
         """Return the name of an observation from type, items, and component."""
         kind, *things, component = parts
-        one = ", ".join(self.word("kind", part, n=1) for part in kind.split(", "))
-        return " ".join([one, *things, self.word("axis", component)])
+        one = ", ".join(self(f"kind.{part}", n=1) for part in kind.split(", "))
+        return " ".join([one, *things, self(f"axis.{component}")])
 
 
 FORMS: dict[str, Callable[[Texts, float], str]] = {

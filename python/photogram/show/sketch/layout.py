@@ -187,7 +187,13 @@ def laid_out(sketch: Sketch) -> list[Placed]:
 def _framed(panel: Panel, box: Box, room: float, numbered: bool, margin: float = 0.0) -> Placed:
     """Compose what is around a box: texts within `room`, and the name of its axis at the left `margin`."""
     (left, top, right, low), above = box, box[1] - 8.0
-    across, up = _ticks(panel, right - left, low - top)
+    sides = ((panel.across_names, right - left, panel.log_across), (panel.up_names, low - top, panel.log_up))
+    across, up = (
+        Ticks(np.arange(len(names), dtype=float), list(names))
+        if names or panel.bare
+        else ticks(panel.limits[:, axis], length, NUMBER, across=axis == 0, log=log, decimal=panel.decimal)
+        for axis, (names, length, log) in enumerate(sides)
+    )
     placed = Placed(panel, box, across, up)
     marks, wide, down = _axes(placed, margin, numbered)
     side, foot = right + (0.0 if panel.across_names else 0.5 * widest(across.texts, NUMBER)), down
@@ -211,8 +217,7 @@ def _framed(panel: Panel, box: Box, room: float, numbered: bool, margin: float =
     title = wrapped(panel.title, TITLE, room)
     above -= LEADING * TITLE * len(title)
     marks.append(_lines(left, above + LEADING * TITLE - 4.0, title, TITLE))
-    sides = wide, top - above - 2.0, side + GAP - right, down - low
-    return replace(placed, frame=marks, sides=sides)
+    return replace(placed, frame=marks, sides=(wide, top - above - 2.0, side + GAP - right, down - low))
 
 
 def _axes(placed: Placed, margin: float, numbered: bool) -> tuple[list[Mark], float, float]:
@@ -326,13 +331,3 @@ def _opened(panel: Panel) -> Panel:
     first, last = panel.limits
     room = np.where(first == last, 1e-6 * np.maximum(np.abs(first), 1.0), 0.0)
     return replace(panel, limits=np.stack([first - room, last + room])) if room.any() else panel
-
-
-def _ticks(panel: Panel, wide: float, high: float) -> list[Ticks]:
-    sides = ((panel.across_names, wide, panel.log_across), (panel.up_names, high, panel.log_up))
-    return [
-        Ticks(np.arange(len(names), dtype=float), list(names))
-        if names or panel.bare
-        else ticks(panel.limits[:, axis], length, NUMBER, across=axis == 0, log=log, decimal=panel.decimal)
-        for axis, (names, length, log) in enumerate(sides)
-    ]

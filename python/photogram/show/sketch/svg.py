@@ -43,19 +43,19 @@ def svg_of(sketch: Sketch, name: str, title: str) -> str:
     panels = laid_out(sketch)
     if not panels:
         return ""
-    parts = [_panel(placed, f"{name}-{k}") for k, placed in enumerate(panels)]
+    parts = []
+    for k, placed in enumerate(panels):
+        clip = element("clipPath", element("rect", **_place(placed.box)), id=f"{name}-{k}-clip")
+        inside = "".join(
+            svg(mark, placed) for mark in sorted(placed.panel.marks, key=lambda each: each.layer)
+        )
+        clipped = element("g", inside, clip_path=f"url(#{name}-{k}-clip)") if inside else ""
+        parts += [clip, clipped, *(svg(mark, POINTS) for mark in placed.frame), _names(placed)]
     right, low = np.max([placed.ends for placed in panels], axis=0).tolist()
     content = element("g", "".join(parts), font_family=LETTERS, font_size=NUMBER, fill="none")
     size = f'viewBox="0 0 {right + 2:.0f} {low + 2:.0f}" width="{96 / 72 * (right + 2):.0f}"'
     head = element("svg", role="img", aria_label=title).removesuffix("/>")
     return f'{head} xmlns="http://www.w3.org/2000/svg" {size}>{content}</svg>'
-
-
-def _panel(placed: Placed, name: str) -> str:
-    clip = element("clipPath", element("rect", **_place(placed.box)), id=f"{name}-clip")
-    content = "".join(svg(mark, placed) for mark in sorted(placed.panel.marks, key=lambda each: each.layer))
-    inside = element("g", content, clip_path=f"url(#{name}-clip)") if content else ""
-    return clip + inside + "".join(svg(mark, POINTS) for mark in placed.frame) + _names(placed)
 
 
 def element(name: str, content: str | None = None, /, **attributes: str | float) -> str:
