@@ -12,7 +12,7 @@ k0)^(2j + 1), the forward camera `brown_forward` is the same mapping.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -201,7 +201,10 @@ def backward(curve: Curve) -> LensParameters:
     given = np.array([curve.focal_length, *curve.coefficients])
     covariance = _with_focal_length(curve)
     values = fitted(given)
-    by = _differences(fitted, given, np.sqrt(np.diag(covariance)))
+    sd = np.sqrt(np.diag(covariance))
+    steps = np.diag(STEP * np.where(sd > 0, sd, np.abs(given)))
+    changes = [(fitted(given + step) - fitted(given - step)) / (2 * step.sum()) for step in steps]
+    by = np.column_stack(changes)
     distorted = curve.radius + curve.at(curve.radius)
     corrected = _columns(distorted, curve.terms)[:, 1:] @ values[1:] + distorted
     apart = corrected - -values[0] / curve.focal_length * curve.radius
@@ -214,15 +217,6 @@ def _with_focal_length(curve: Curve) -> Floats:
     whole[0, 0] = curve.sd_focal_length**2
     whole[1:, 1:] = curve.covariance
     return whole
-
-
-def _differences(function: Callable[[Floats], Floats], at: Floats, sd: Floats) -> Floats:
-    columns = []
-    for k, step in enumerate(STEP * np.where(sd > 0, sd, np.abs(at))):
-        moved = np.zeros(len(at))
-        moved[k] = step
-        columns.append((function(at + moved) - function(at - moved)) / (2 * step))
-    return np.column_stack(columns)
 
 
 def _columns(radius: Floats, terms: int) -> Floats:

@@ -67,13 +67,17 @@ class StepsCompared(Documented):
 
     def document(self) -> Document:
         """Return the document of the comparison (JSON members: docs/film.md)."""
-        results = {"inside": self.inside, "before": self.before}
+        results, facts = {"inside": self.inside, "before": self.before}, []
+        for name, own in (("one step", self.inside), ("two steps", self.before)):
+            if (test := own.global_test) is not None:
+                expected = about("expected", low=test.limits[0], high=test.limits[1])
+                facts.append(Fact.of(f"Unit variance, {name}", test.variance, note=expected, figures=4))
         of_axes = replace(_axes(self), note=f"{self.sentence[:1].upper()}{self.sentence[1:]}.")
         return Document(
             what=WHAT,
             title=self.inside.block.title,
             judgements=[judged(self.inside.verdict, "films inside the adjustment")],
-            highlights=_facts(self),
+            highlights=[*facts, Fact("Points compared", counted(len(self.rows), "point"))],
             sections=[
                 Section("points", of_axes.title, [of_axes], _WHY),
                 Section.of(verdict_table(self.inside.verdict)),
@@ -147,14 +151,3 @@ def _axes(found: StepsCompared) -> Table:
         Quantity(names, kind="name", member="largest_at", head="At"),
     ]
     return Table("axes", "Medians of standard deviations, and differences of points", columns)
-
-
-def _facts(found: StepsCompared) -> list[Fact]:
-    facts = []
-    for name, result in (("one step", found.inside), ("two steps", found.before)):
-        test = result.global_test
-        if test is not None:
-            low, high = test.limits
-            expected = about("expected", low=low, high=high)
-            facts.append(Fact.of(f"Unit variance, {name}", test.variance, note=expected, figures=4))
-    return [*facts, Fact("Points compared", counted(len(found.rows), "point"))]

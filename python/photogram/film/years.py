@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from datetime import date
+from itertools import combinations
 
 import numpy as np
 
@@ -271,65 +272,47 @@ def compare_cameras(
         If a camera has fewer than two calibrations, one without date or covariance, or the same one twice. If
         cameras have several units, or if the angle is unknown.
     """
-    records = sorted(_dated(calibrations), key=lambda each: each.day)
-    remarks: list[Phrase] = []
+    terms: dict[str, int] = {}
+    for each in calibrations:
+        if isinstance(each, Certificate) and each.radial is not None:
+            terms[each.name] = max(terms.get(each.name, 1), each.curve().terms)
+    dated = [
+        DatedCamera.of(each, None if each.radial is None else terms[each.name])
+        if isinstance(each, Certificate)
+        else each
+        for each in calibrations
+    ]
+    records, remarks = sorted(dated, key=lambda each: each.day), list[Phrase]()
     histories, angles = {}, {}
     for title in dict.fromkeys(each.camera.title for each in records):
         name, own = f"camera {title}", [each for each in records if each.camera.title == title]
         if len(own) < 2:
             remarks.append(phrase("films.single-calibration", camera=name))
             continue
-        _refuse_twice(own)
-        angles[name] = _common_angle(own, name) if angle is None else angle
-        histories[name], held = _history(own, angles[name], level)
-        if held:
-            remarks.append(phrase("films.not-compared", camera=name, figures=held))
+        for first, second in combinations(own, 2):
+            if first.day == second.day and first.camera.parameters == second.camera.parameters:
+                raise InputError(phrase("films.repeated", first=first.source, second=second.source))
+        known = [each.angle for each in own if each.angle is not None] if angle is None else [angle]
+        if not known:
+            raise InputError(phrase("films.unknown-angle", camera=name))
+        angles[name] = min(known)
+        found = figures_of([each.camera for each in own], angles[name])
+        dates = dates_of([each.day for each in own], [each.source for each in own])
+        histories[name] = history(
+            found.values,
+            found.covariances,
+            times=np.array(dates.years),
+            occasions=dates.names,
+            names=found.names,
+            units=found.units,
+            unit_of_time="year",
+            level=level,
+        )
+        if found.held:
+            remarks.append(phrase("films.not-compared", camera=name, figures=found.held))
     if not histories:
         raise InputError(phrase("films.two-calibrations"))
     return CameraComparison(tuple(records), histories, angles, tuple(remarks))
-
-
-def _dated(calibrations: Sequence[Certificate | DatedCamera]) -> list[DatedCamera]:
-    most: dict[str, int] = {}
-    for each in calibrations:
-        if isinstance(each, Certificate) and each.radial is not None:
-            most[each.name] = max(most.get(each.name, 1), each.curve().terms)
-    return [
-        DatedCamera.of(each, None if each.radial is None else most[each.name])
-        if isinstance(each, Certificate)
-        else each
-        for each in calibrations
-    ]
-
-
-def _refuse_twice(records: Sequence[DatedCamera]) -> None:
-    for k, first in enumerate(records):
-        for second in records[k + 1 :]:
-            if first.day == second.day and first.camera.parameters == second.camera.parameters:
-                raise InputError(phrase("films.repeated", first=first.source, second=second.source))
-
-
-def _common_angle(records: Sequence[DatedCamera], name: str) -> float:
-    known = [each.angle for each in records if each.angle is not None]
-    if not known:
-        raise InputError(phrase("films.unknown-angle", camera=name))
-    return min(known)
-
-
-def _history(records: Sequence[DatedCamera], angle: float, level: float) -> tuple[History, tuple[str, ...]]:
-    found = figures_of([each.camera for each in records], angle)
-    dates = dates_of([each.day for each in records], [each.source for each in records])
-    compared = history(
-        found.values,
-        found.covariances,
-        times=np.array(dates.years),
-        occasions=dates.names,
-        names=found.names,
-        units=found.units,
-        unit_of_time="year",
-        level=level,
-    )
-    return compared, found.held
 
 
 ANGLE = (Axis.turned("", "deg"),)

@@ -41,6 +41,10 @@ BoardKind = Literal["chessboard", "charuco", "aprilgrid", "circles", "asymmetric
 MAX_POINTS = 100_000
 MAX_LENGTH = 1e50  # in the unit of the board; fourth powers of lengths remain finite
 MIN_VIEWS_OF_FREE_POINTS = 8  # the default shape is `points` from this number
+_FIELDS_OF_OTHERS = {
+    "points": ("tag_size", "tag_spacing", "spacing"),
+    "aprilgrid": ("points", "point_names"),
+}
 PLANE_SDS_PER_SPACING, PLACE_SDS_PER_SPACING = 200.0, 500.0
 
 
@@ -97,36 +101,33 @@ class Board(Valued, Brief):
 
     def __post_init__(self) -> None:
         check_fields(self)
+        for name in _FIELDS_OF_OTHERS.get(self.kind, ("points", "point_names", "tag_size", "tag_spacing")):
+            if getattr(self, name) is not None:
+                kind = phrase("targets.kind", kind=self.kind)
+                raise InputError(phrase("error.not-applicable", name=name, other=kind))
         if self.kind == "points":
-            self._refuse("tag_size", "tag_spacing", "spacing")
-            if self.points is None:
-                raise argument_error("points", "empty")
-            if self.shape == "bend":
-                raise InputError(phrase("targets.bend"))
-            self._set("points", shaped("points", self.points, (None, 3)))
-            count = len(np.asarray(self.points))
-            beyond = ~(np.abs(np.asarray(self.points)) <= MAX_LENGTH)
-            if beyond.any():
-                value = float(np.asarray(self.points)[beyond][0])
-                raise argument_error("points", "range", low=-MAX_LENGTH, high=MAX_LENGTH, value=value)
-            if self.point_names is not None:
-                point_names = names("point_names", self.point_names)
-                if len(point_names) != count or len(set(point_names)) < count:
-                    raise InputError(phrase("targets.names", count=count, given=len(set(point_names))))
-                self._set("point_names", tuple(point_names))
+            self._check_points()
         else:
             self._check_grid()
         if self.point_sd is not None:
             self._set("point_sd", shaped("point_sd", self.point_sd, (len(self.places), 3), "not-negative"))
 
-    def _refuse(self, *fields: str) -> None:
-        for name in fields:
-            if getattr(self, name) is not None:
-                kind = phrase("targets.kind", kind=self.kind)
-                raise InputError(phrase("error.not-applicable", name=name, other=kind))
+    def _check_points(self) -> None:
+        if self.points is None:
+            raise argument_error("points", "empty")
+        if self.shape == "bend":
+            raise InputError(phrase("targets.bend"))
+        points = shaped("points", self.points, (None, 3))
+        self._set("points", points)
+        for value in points[~(np.abs(points) <= MAX_LENGTH)].tolist()[:1]:
+            raise argument_error("points", "range", low=-MAX_LENGTH, high=MAX_LENGTH, value=value)
+        if self.point_names is not None:
+            point_names = names("point_names", self.point_names)
+            if not len(point_names) == len(set(point_names)) == len(points):
+                raise InputError(phrase("targets.names", count=len(points), given=len(set(point_names))))
+            self._set("point_names", tuple(point_names))
 
     def _check_grid(self) -> None:
-        self._refuse("points", "point_names")
         least = 1 if self.kind == "aprilgrid" else 2
         for name in ("columns", "rows"):
             if (count := getattr(self, name)) < least:
@@ -134,20 +135,15 @@ class Board(Valued, Brief):
         columns, rows = self.grid
         if columns * rows > MAX_POINTS:
             raise argument_error("columns x rows", "most", high=MAX_POINTS, value=columns * rows)
-        if self.kind == "aprilgrid":
-            for name in ("tag_size", "tag_spacing"):
-                if getattr(self, name) is None:
-                    raise argument_error(name, "empty")
-            assert self.tag_size is not None
-            assert self.tag_spacing is not None
+        for name in ("tag_size", "tag_spacing") if self.kind == "aprilgrid" else ("spacing",):
+            if getattr(self, name) is None:
+                raise argument_error(name, "empty")
+        if self.tag_size is not None and self.tag_spacing is not None:
             pitch = self.tag_size * (1 + self.tag_spacing)
             if self.spacing not in (None, pitch, (pitch, pitch)):
                 raise InputError(phrase("targets.april-spacing", pitch=pitch, value=str(self.spacing)))
             self._set("spacing", (pitch, pitch))
             return
-        self._refuse("tag_size", "tag_spacing")
-        if self.spacing is None:
-            raise argument_error("spacing", "empty")
         both = self.spacing if isinstance(self.spacing, Sequence) else (self.spacing, self.spacing)
         if len(both) != 2:
             raise argument_error("spacing", "count", count=2, actual=len(both))

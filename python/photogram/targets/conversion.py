@@ -217,7 +217,13 @@ def convert_lens(
     if (2 * np.count_nonzero(near) < len(free) and start.knots is None) or not near.any():
         raise InputError(phrase("targets.shows-nothing", model=model, camera=source.title))
     finite = math.isfinite(apart[0])
-    roots = None if known is None else _roots(source, known, points[near])
+    roots = None  # of the inverse covariances of projected points
+    if known is not None:
+        partials = source.partials(points[near] * TURNED)[2][..., known[0]]
+        covariances = partials @ known[1] @ partials.transpose(0, 2, 1)
+        mean = float(np.trace(covariances, axis1=1, axis2=2).mean()) / 2
+        added = (MIN_RELATIVE_VARIANCE * mean or 1.0) * np.eye(2)
+        roots = np.linalg.inv(np.linalg.cholesky(covariances + added))
     shown = Points(points[near], places[near], finite, roots)
     moving = NO_MOTION if intrinsics_only or start.knots is not None else slice(0 if finite else 3, 6)
     found = fitted_in_stages(Moved(start), shown, free, moving)
@@ -264,16 +270,6 @@ def _known(source: Camera, given: tuple[Sequence[str], ArrayLike] | None) -> tup
         return None
     joint = source.prior_covariance
     return weighted, np.diag(source.deviations[weighted] ** 2) if joint is None else joint
-
-
-def _roots(source: Camera, known: tuple[list[int], Floats], points: Floats) -> Floats:
-    """Return (m, 2, 2) roots of the inverse covariances of projected points."""
-    rows, matrix = known
-    partials = source.partials(points * TURNED)[2][..., rows]
-    covariances = partials @ matrix @ partials.transpose(0, 2, 1)
-    mean = float(np.trace(covariances, axis1=1, axis2=2).mean()) / 2
-    lower = np.linalg.cholesky(covariances + (MIN_RELATIVE_VARIANCE * mean or 1.0) * np.eye(2))
-    return np.asarray(np.linalg.inv(lower))
 
 
 def _passed_on(

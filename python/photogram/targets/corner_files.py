@@ -136,15 +136,14 @@ def read_headless(path: Path, board: Board | None) -> Measured:
 
 def _of_table(table: ColumnTable, board: Board | None) -> Measured:
     table.require("x", "y")
-    xy = table.vectors(("x", "y"))
-    table.check_given(xy, ("x", "y"))
+    xy = table.given(("x", "y"))
     sd, use = _of_levels(table)
     own = "image" if "image" in table else "time"
     table.require(own)
     cameras = table.texts("camera") if "camera" in table else None
     keys = table.texts(own)
     if own == "image":
-        table.names(own)
+        table.names(own)  # rejects similar ones
     # Image names may be repeated for different cameras.
     whole = (
         keys if cameras is None else [f"{camera}\0{key}" for camera, key in zip(cameras, keys, strict=True)]
@@ -159,6 +158,12 @@ def _of_table(table: ColumnTable, board: Board | None) -> Measured:
         if len(missing):
             raise table.cell_error(first[int(missing[0])], "time", "error.empty")
         times = times * (1e-9 if times.max(initial=0.0) > MIN_NANOSECONDS else 1.0)
+    views = None
+    if "view" in table:
+        of_rows = np.array(table.texts("view"), dtype=object)
+        for row in np.flatnonzero(of_rows != of_rows[first][image]).tolist()[:1]:
+            raise table.cell_error(row, "view", "targets.other-view")
+        views = of_rows[first].tolist()
     return Measured(
         path=table.path,
         images=[keys[row] for row in first],
@@ -168,20 +173,9 @@ def _of_table(table: ColumnTable, board: Board | None) -> Measured:
         sd=sd,
         use=use & table.flags("use"),
         cameras=None if cameras is None else [cameras[row] for row in first],
-        views=_of_images(table, image, first),
+        views=views,
         times=times,
     )
-
-
-def _of_images(table: ColumnTable, image: Indices, first: list[int]) -> list[str] | None:
-    if "view" not in table:
-        return None
-    views = table.texts("view")
-    found = [views[row] for row in first]
-    for row, own in enumerate(image.tolist()):
-        if views[row] != found[own]:
-            raise table.cell_error(row, "view", "targets.other-view")
-    return found
 
 
 def _points(table: ColumnTable, board: Board | None) -> Indices:

@@ -293,10 +293,9 @@ def _sizes_of_pictures(
 def _cameras_and_views(
     measured: Measured, how: CalibrationOptions
 ) -> tuple[list[str], list[str], Bools, list[Message]]:
-    images = measured.images
-    keep = np.ones(len(images), dtype=bool)
+    images, messages = measured.images, list[Message]()
+    names, keys, keep = ["camera"] * len(images), list(images), np.ones(len(images), dtype=bool)
     if how.cameras:
-        names, keys = [""] * len(images), [""] * len(images)
         patterns = [re.compile(_with_groups(each)) for each in how.cameras]
         for row, image in enumerate(images):
             found = [(k, match) for k, each in enumerate(patterns) if (match := each.fullmatch(image))]
@@ -304,24 +303,15 @@ def _cameras_and_views(
                 raise InputError(phrase("targets.two-cameras", image=image), file=measured.path)
             keep[row] = bool(found)
             for k, match in found:
-                names[row] = _name_of(how.cameras[k], k)
-                keys[row] = "".join(match.groups())
-        left = [images[row] for row in np.flatnonzero(~keep).tolist()]
-        messages = [Message(phrase("targets.no-pattern", names=left))] if left else []
-        return names, _views_or(measured, keys), keep, messages
-    if measured.cameras is None:
-        return ["camera"] * len(images), _views_or(measured, images), keep, []
-    names = list(measured.cameras)
-    several = len(set(names)) > 1
-    keys = list(images)
-    if several:  # the digits of a name, or the full name without digits
-        rests = [image.replace(name, "", 1) for image, name in zip(images, names, strict=True)]
-        keys = ["-".join(re.findall(r"\d+", rest)) or rest for rest in rests]
-    return names, _views_or(measured, keys), keep, []
-
-
-def _views_or(measured: Measured, keys: Sequence[str]) -> list[str]:
-    return list(keys if measured.views is None else measured.views)
+                names[row], keys[row] = _name_of(how.cameras[k], k), "".join(match.groups())
+        if left := [images[row] for row in np.flatnonzero(~keep).tolist()]:
+            messages.append(Message(phrase("targets.no-pattern", names=left)))
+    elif measured.cameras is not None:
+        names = list(measured.cameras)
+        if len(set(names)) > 1:  # the digits of a name, or the full name without digits
+            rests = [image.replace(name, "", 1) for image, name in zip(images, names, strict=True)]
+            keys = ["-".join(re.findall(r"\d+", rest)) or rest for rest in rests]
+    return names, keys if measured.views is None else list(measured.views), keep, messages
 
 
 def _with_groups(pattern: str) -> str:

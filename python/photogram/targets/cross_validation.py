@@ -331,7 +331,12 @@ def appraise(
         if calibrated.calibration.corners.sizes[number] is None:
             remarks.append(phrase("targets.no-size", camera=camera.name))
             continue
-        model = model_verdict(calibrated, number, cross)
+        verdicts = [each.verdict for each in cross if camera.name in each.cameras]
+        verdicts = verdicts or ["model not tested by cross-validation"]
+        frame = phrase("test.frame", camera=camera.name)
+        if any(test.kind == frame and not test.accepted for test in calibrated.verdict.tests):
+            verdicts.append("residuals have a pattern over the picture: the map is optimistic")
+        model = "; ".join(verdicts)
         for distance in asked.distances or (math.inf, median_distance(calibrated, number)):
             report(f"map of {camera.name} {at_distance(distance, calibrated.calibration.board.unit)}")
             how: dict[str, Any] = {"datum": asked.datum, "noise_only": asked.noise_only, "model": model}
@@ -342,16 +347,6 @@ def appraise(
         at = maps[0].distance
         suggestions.append(suggest_views(calibrated, at, camera=maps[0].camera, views=asked.suggest))
     return Worth(maps=tuple(maps), cross=tuple(cross), suggestions=tuple(suggestions), remarks=tuple(remarks))
-
-
-def model_verdict(calibrated: Calibrated, camera: int, cross: Sequence[CrossValidation]) -> str:
-    name = calibrated.cameras[camera].name
-    verdicts = [each.verdict for each in cross if name in each.cameras]
-    verdicts = verdicts or ["model not tested by cross-validation"]
-    for test in calibrated.verdict.tests:
-        if test.kind == phrase("test.frame", camera=name) and not test.accepted:
-            verdicts.append("residuals have a pattern over the picture: the map is optimistic")
-    return "; ".join(verdicts)
 
 
 def median_distance(calibrated: Calibrated, camera: int) -> float:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import replace
 from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Panel, Shades, contours
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, VERMILION, round_length
@@ -52,7 +52,7 @@ def plot_uncertainty(found: UncertaintyMap) -> Plot:
             Markers(found.corners[::step], ".", 2.5, "white", edge=0.0, opacity=0.6),
             Line(np.vstack([coverage, coverage[:1]]), VERMILION, 1.2),
         ]
-    panel = _map(found.size, found.columns, found.rows, found.sd, "px", marks)
+    panel = _map(found, found.sd, "px", marks)
     title = found.title + "\n" + found.model.replace("; ", "\n")
     return Plot(WIDTH_INCHES, _height(found.size), [replace(panel, title=title)])
 
@@ -106,13 +106,10 @@ def plot_difference(found: CameraDifference) -> Plot:
     found
         The difference.
     """
-    names = f"{found.cameras[1]} less {found.cameras[0]}"
-    panels = list[Panel]()
+    names, chi2, panels = f"{found.cameras[1]} less {found.cameras[0]}", found.chi2, list[Panel]()
     for number, distance in enumerate(found.distances):
-        own = _Apart(found.size, found.columns, found.rows, found.vectors[number], found.inside)
-        panels.append(own.panel(f"{names} {at_distance(distance, found.unit)}, px"))
-        if found.chi2 is not None:
-            panels.append(own.beside(found.chi2[number]))
+        title = f"{names} {at_distance(distance, found.unit)}, px"
+        panels += _apart(found, found.vectors[number], None if chi2 is None else chi2[number], title)
     rows = len(found.distances)
     columns = len(panels) // rows
     panels[-columns] = replace(panels[-columns], notes=found.remarks)
@@ -130,40 +127,33 @@ def plot_cross_validation(cross: CrossValidation, over: UncertaintyMap) -> Plot:
         Uncertainty map that defines camera, grid and distance.
     """
     found = cross.map(cross.cameras.index(over.camera), over.pixels.reshape(-1, 2), over.distance)
-    shape = over.sd.shape
-    own = _Apart(over.size, over.columns, over.rows, found.differences.reshape(*shape, 2), over.inside)
-    away = at_distance(over.distance, over.unit)
-    left = own.panel(f"{over.camera}: second part of the views less the first, {away}, px")
-    panels = [replace(left, notes=[cross.verdict]), own.beside(found.chi2.reshape(shape) / 2)]
+    shape, away = over.sd.shape, at_distance(over.distance, over.unit)
+    title = f"{over.camera}: second part of the views less the first, {away}, px"
+    panels = _apart(over, found.differences.reshape(*shape, 2), found.chi2.reshape(shape) / 2, title)
+    panels[0] = replace(panels[0], notes=[cross.verdict])
     return Plot(2 * WIDTH_INCHES, _height(over.size), panels, 2)
 
 
-@dataclass(frozen=True, eq=False)
-class _Apart:
-    """Differences over an image: (h, w, 2) vectors, and (h, w) mask for the scale."""
+def _apart(
+    over: UncertaintyMap | CameraDifference, vectors: Floats, chi2: Floats | None, title: str
+) -> list[Panel]:
+    """Return panels of (h, w, 2) differences over an image, and of their ratio to the covariances, if known.
 
-    size: tuple[int, int]
-    columns: Floats
-    rows: Floats
-    vectors: Floats
-    inside: Bools
-
-    def panel(self, title: str) -> Panel:
-        lengths = np.asarray(np.hypot(self.vectors[..., 0], self.vectors[..., 1]))
-        step = max(1, round(len(self.columns) / ARROWS_ALONG_PICTURE))
-        every = (slice(None, None, step), slice(None, None, step))
-        places = np.stack(np.meshgrid(self.columns, self.rows), axis=-1)[every].reshape(-1, 2)
-        vectors = self.vectors[every].reshape(-1, 2)
-        largest = float(np.fmax.reduce(lengths[self.inside], initial=0.0)) or 1.0
-        known = np.hypot(*vectors.T) <= 2 * largest
-        scale = step * (self.columns[1] - self.columns[0]) / largest
-        arrows = Arrows(places[known], scale * vectors[known], BLUE, 0.002)
-        panel = _map(self.size, self.columns, self.rows, lengths, "px", [arrows])
-        return replace(panel, title=title)
-
-    def beside(self, chi2: Floats) -> Panel:
-        panel = _map(self.size, self.columns, self.rows, chi2, "", lowest=0.1)
-        return replace(panel, title="beside its covariance: d' Q⁻¹ d / 2, about 1 where that explains it")
+    Lengths are contours, and vectors are scaled to their spacing.
+    """
+    lengths = np.asarray(np.hypot(vectors[..., 0], vectors[..., 1]))
+    step = max(1, round(len(over.columns) / ARROWS_ALONG_PICTURE))
+    every = (slice(None, None, step), slice(None, None, step))
+    places = np.stack(np.meshgrid(over.columns, over.rows), axis=-1)[every].reshape(-1, 2)
+    largest = float(np.fmax.reduce(lengths[over.inside], initial=0.0)) or 1.0
+    known = lengths[every].ravel() <= 2 * largest
+    scale = step * (over.columns[1] - over.columns[0]) / largest
+    arrows = Arrows(places[known], scale * vectors[every].reshape(-1, 2)[known], BLUE, 0.002)
+    panels = [replace(_map(over, lengths, "px", [arrows]), title=title)]
+    if chi2 is not None:
+        beside = "beside its covariance: d' Q⁻¹ d / 2, about 1 where that explains it"
+        panels.append(replace(_map(over, chi2, "", lowest=0.1), title=beside))
+    return panels
 
 
 def _height(size: tuple[int, int]) -> float:
@@ -171,16 +161,14 @@ def _height(size: tuple[int, int]) -> float:
 
 
 def _map(
-    size: tuple[int, int],
-    columns: Floats,
-    rows: Floats,
+    over: UncertaintyMap | CameraDifference,
     values: Floats,
     unit: str,
     marks: Sequence[Mark] = (),
     lowest: float = 0.01,
 ) -> Panel:
     """Return filled contours at 1, 2, 5 steps below other marks."""
-    panel = in_pixels(size)
+    panel = in_pixels(over.size)
     positive = values[np.isfinite(values) & (values > 0)]
     if not positive.size:
         return replace(panel, marks=marks)
@@ -188,7 +176,7 @@ def _map(
     levels = steps_of_125(max(float(positive.min()), lowest * high), high)
     shades = Shades(float(levels[0]), float(levels[-1]), unit, log=True)
     shown = np.where(values > 0, values, np.nan)
-    areas = contours(columns, rows, shown, levels, shades, steps=COLOURS_PER_CONTOUR)
+    areas = contours(over.columns, over.rows, shown, levels, shades, steps=COLOURS_PER_CONTOUR)
     return replace(panel, marks=[*areas, *marks], shades=shades)
 
 

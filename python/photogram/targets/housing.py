@@ -150,10 +150,7 @@ def mean_motion(poses: Sequence[Floats] | Floats) -> Floats:
 
 
 def camera_number(calibrated: Calibrated, camera: int | str) -> int:
-    """Return the number of a camera by number or name.
-
-    InputError: if it does not exist.
-    """
+    """Return the number of a camera by number or name; InputError if it does not exist."""
     names = [each.name for each in calibrated.cameras]
     if isinstance(camera, str) and camera in names:
         return names.index(camera)
@@ -163,10 +160,7 @@ def camera_number(calibrated: Calibrated, camera: int | str) -> int:
 
 
 def size_of(calibrated: Calibrated, camera: int) -> tuple[int, int]:
-    """Return image width and height of a camera.
-
-    InputError: if they are unknown.
-    """
+    """Return image width and height of a camera; InputError if they are unknown."""
     size = calibrated.calibration.corners.sizes[camera]
     if size is None:
         name = calibrated.cameras[camera].name
@@ -180,14 +174,31 @@ def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
     if cameras[0] not in made:
         corners = calibrated.calibration.corners
         views = np.unique(corners.views[np.isin(corners.cameras, cameras)])
-        poses, by_board = calibrated.poses[views], _points_by_board(calibrated)
+        poses, block = calibrated.poses[views], calibrated.block
+        rows, count = _board_rows(calibrated), len(calibrated.points)
+        by_board = np.zeros((count, 3, len(rows), 3))
+        by_board[rows, :, np.arange(len(rows))] = np.eye(3)
+        by_board = by_board.reshape(count, 3, -1)
+        if calibrated.bend is not None:
+            by_board = calibrated.calibration.board.shifts().transpose(0, 2, 1)
+        used = calibrated.used_images & np.isin(corners.cameras[block.image_photos], cameras)
+        used &= calibrated.image_weights > 0
+        photos = block.image_photos[used]
+        seen = SeenCorners(
+            cameras=np.argsort(cameras)[np.searchsorted(np.sort(cameras), corners.cameras[photos])],
+            views=np.searchsorted(views, corners.views[photos]),
+            points=block.image_points[used],
+            xy=block.image_xy[used],
+            sd=block.image_sd[used, 0] / np.sqrt(calibrated.image_weights[used]),
+            poses=calibrated.picture_poses[photos],
+        )
         made[cameras[0]] = Housing(
             cameras=tuple(calibrated.cameras[each].camera for each in cameras),
             sensors=calibrated.sensors[cameras],
             poses=poses,
             points=calibrated.points,
             points_by_board=by_board,
-            seen=_seen(calibrated, cameras, views),
+            seen=seen,
             cofactors=_cofactors(calibrated, cameras, views, poses, by_board.shape[2]),
             weights=_weights(calibrated, cameras),
             variance=calibrated.covariance_scale,
@@ -207,31 +218,6 @@ def _board_rows(calibrated: Calibrated) -> list[int]:
     if calibrated.calibration.shape != "points":
         return []
     return np.flatnonzero(calibrated.used_points).tolist()
-
-
-def _points_by_board(calibrated: Calibrated) -> Floats:
-    if calibrated.bend is not None:
-        return calibrated.calibration.board.shifts().transpose(0, 2, 1)
-    rows = _board_rows(calibrated)
-    found = np.zeros((len(calibrated.points), 3, len(rows), 3))
-    found[rows, :, np.arange(len(rows))] = np.eye(3)
-    return found.reshape(len(found), 3, -1)
-
-
-def _seen(calibrated: Calibrated, cameras: list[int], views: Indices) -> SeenCorners:
-    result, corners = calibrated, calibrated.calibration.corners
-    block = result.block
-    used = result.used_images & np.isin(corners.cameras[block.image_photos], cameras)
-    used &= result.image_weights > 0
-    photos = block.image_photos[used]
-    return SeenCorners(
-        cameras=np.array([cameras.index(each) for each in corners.cameras[photos].tolist()], dtype=np.int64),
-        views=np.searchsorted(views, corners.views[photos]),
-        points=block.image_points[used],
-        xy=block.image_xy[used],
-        sd=block.image_sd[used, 0] / np.sqrt(result.image_weights[used]),
-        poses=calibrated.picture_poses[photos],
-    )
 
 
 def _cofactors(

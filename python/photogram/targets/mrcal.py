@@ -32,7 +32,7 @@ from photogram.targets.calibration import Calibration
 from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corner_files import KEY
 from photogram.targets.corners import Corners
-from photogram.targets.npz_arrays import Arrays, read_arrays
+from photogram.targets.opencv_corners import Arrays, read_arrays
 from photogram.targets.output import Rig
 from photogram.targets.uncertainty import UncertaintyMap
 from photogram.targets.vision import inverted, of_vectors
@@ -52,37 +52,19 @@ SPLINED = re.compile(r"SPLINED_STEREOGRAPHIC_order=(\d+)_Nx=(\d+)_Ny=(\d+)_fov_x
 
 def lens_of_mrcal(model: str, values: Sequence[float], name: str = "") -> Camera:
     said = model.removeprefix(PREFIX)
-    if splined := SPLINED.fullmatch(said):
-        order, nx, ny, fov = map(float, splined.groups())
-        _count(model, values, 4 + 2 * int(nx) * int(ny))
-        return Camera(
-            KNOTTED,
-            dict(
-                zip((*CORE, "order", "nx", "ny", "fov_x_deg"), [*values[:4], order, nx, ny, fov], strict=True)
-            ),
-            name=name,
-            knots=np.reshape(values[4:], (int(ny), int(nx), 2)),
-        )
-    if said not in LENSES:
+    splined = SPLINED.fullmatch(said)
+    if splined is None and said not in LENSES:
         raise InputError(phrase("targets.mrcal-lens", model=model, names=[*LENSES, "splined models"]))
-    own, count = LENSES[said]
-    _count(model, values, count)
+    order, nx, ny, fov = map(float, splined.groups()) if splined else (0.0, 0.0, 0.0, 0.0)
+    own, count = (KNOTTED, 4 + 2 * int(nx) * int(ny)) if splined else LENSES[said]
+    if len(values) != count:
+        raise argument_error(model, "count", count=count, actual=len(values))
+    if splined:
+        lattice = {"order": order, "nx": nx, "ny": ny, "fov_x_deg": fov}
+        knots = np.reshape(values[4:], (int(ny), int(nx), 2))
+        return Camera(own, dict(zip(CORE, values[:4], strict=True)) | lattice, name=name, knots=knots)
     names = Camera(own, dict.fromkeys(CORE, 1.0)).names[:count]
     return Camera(own, dict(zip(names, values, strict=True)), name=name)
-
-
-def _count(model: str, values: Sequence[float], needed: int) -> None:
-    if len(values) != needed:
-        raise argument_error(model, "count", count=needed, actual=len(values))
-
-
-def freed(camera: Camera, model: str, core: bool, lens: bool) -> Camera:
-    """Return an mrcal camera with its core, lens terms or knots free as in mrcal."""
-    own = CORE if core else ()
-    if camera.knots is not None:
-        return camera.replace(sd=dict.fromkeys(own, math.inf), knot_sd=math.inf if lens else 0.0)
-    terms = camera.names[4 : LENSES[model.removeprefix(PREFIX)][1]]
-    return camera.replace(sd=dict.fromkeys((*own, *(terms if lens else ())), math.inf))
 
 
 INDICES = "indices_frame_camintrinsics_camextrinsics"
@@ -179,12 +161,20 @@ def _content(path: Path) -> dict[str, Any]:
 
 
 def _cameras(arrays: Arrays) -> list[Camera]:
-    core = arrays.first("do_optimize_intrinsics_core", "do_optimize_intrinsic_core")
-    lens = arrays.first("do_optimize_intrinsics_distortions", "do_optimize_intrinsic_distortions")
-    model, rows = arrays.text("lensmodel"), arrays.numbers("intrinsics", None, None)
-    with at_place(Place(arrays.path)):
-        cameras = [lens_of_mrcal(model, row, f"camera {k}") for k, row in enumerate(rows.tolist())]
-    return [freed(camera, model, arrays.says(core), arrays.says(lens)) for camera in cameras]
+    """Return the cameras with core, lens terms or knots free as in mrcal."""
+    core = arrays.says(arrays.first("do_optimize_intrinsics_core", "do_optimize_intrinsic_core"))
+    lens = arrays.says(
+        arrays.first("do_optimize_intrinsics_distortions", "do_optimize_intrinsic_distortions")
+    )
+    model, rows, cameras = arrays.text("lensmodel"), arrays.numbers("intrinsics", None, None), []
+    for k, row in enumerate(rows.tolist()):
+        with at_place(Place(arrays.path)):
+            camera = lens_of_mrcal(model, row, f"camera {k}")
+        terms = camera.names[4 : len(row)] if lens and camera.knots is None else ()
+        sd = dict.fromkeys((*(CORE if core else ()), *terms), math.inf)
+        knot_sd = None if camera.knots is None else math.inf if lens else 0.0
+        cameras.append(camera.replace(sd=sd, knot_sd=knot_sd))
+    return cameras
 
 
 def _poses(arrays: Arrays, indices: Indices, count: int) -> tuple[Floats, Floats]:
@@ -291,7 +281,14 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
         return None
     bend = calibrated.bend
     variance = calibrated.variance_of_unit_weight or 1.0
-    observed, indices = _observations(calibrated)
+    corners = calibration.corners
+    observed = np.zeros((len(corners.pictures), board.rows * board.columns, 3))
+    observed[..., 2] = WEIGHT_OF_ABSENT
+    observed[corners.picture, corners.point, :2] = corners.xy
+    # Unused corners have a weight below 0.
+    observed[corners.picture, corners.point, 2] = np.where(corners.use, 1.0, -1.0) / corners.sd
+    order = np.lexsort([corners.cameras, corners.views])
+    indices = np.column_stack([corners.views, corners.cameras, corners.cameras - 1]).astype(np.int32)
     estimated = set().union(*free)
     terms = bool(estimated - {"f", *CORE}) or any(each.given.knot_unknowns for each in calibrated.cameras)
     arrays: dict[str, Any] = {
@@ -299,8 +296,8 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
         "extrinsics_rt_fromref": _vectors(rig.sensors[1:]) if count > 1 else np.zeros((0, 6)),
         "frames_rt_toref": _vectors(calibrated.poses),
         "points": "",
-        "observations_board": observed,
-        INDICES: indices,
+        "observations_board": observed.reshape(-1, board.rows, board.columns, 3)[order],
+        INDICES: indices[order],
         "observations_point": "",
         "indices_point_camintrinsics_camextrinsics": "",
         "lensmodel": PREFIX + lenses[0][0],
@@ -320,18 +317,6 @@ def _inputs(rig: Rig, calibrated: Calibrated, lenses: list[tuple[str, Floats]]) 
     file = io.BytesIO()
     np.savez_compressed(file, **arrays)
     return base64.b85encode(file.getvalue())
-
-
-def _observations(calibrated: Calibrated) -> tuple[Floats, Any]:
-    corners, board = calibrated.calibration.corners, calibrated.calibration.board
-    found = np.zeros((len(corners.pictures), board.rows * board.columns, 3))
-    found[..., 2] = WEIGHT_OF_ABSENT
-    found[corners.picture, corners.point, :2] = corners.xy
-    # Unused corners have a weight below 0.
-    found[corners.picture, corners.point, 2] = np.where(corners.use, 1.0, -1.0) / corners.sd
-    order = np.lexsort([corners.cameras, corners.views])
-    indices = np.column_stack([corners.views, corners.cameras, corners.cameras - 1]).astype(np.int32)
-    return found.reshape(-1, board.rows, board.columns, 3)[order], indices[order]
 
 
 OUTLINE_DIRECTIONS, OUTLINE_STEPS = 90, 400  # about the most accurate pixel

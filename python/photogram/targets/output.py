@@ -43,10 +43,7 @@ class Rig:
         return bool(np.isfinite(self.sensors[camera]).all())
 
     def size(self, camera: int) -> tuple[int, int]:
-        """Return image width and height of a camera.
-
-        InputError: if they are unknown.
-        """
+        """Return image width and height of a camera; InputError if they are unknown."""
         found = self.sizes[camera]
         if found is None:
             raise InputError(phrase("targets.no-size", camera=self.names[camera]))

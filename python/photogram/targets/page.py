@@ -31,8 +31,7 @@ from photogram.show.page import (
     significant,
 )
 from photogram.show.quantity import Axis, Quantity, Table, column, members, records
-from photogram.targets.calibration_difference import CameraDifference, DifferenceTest
-from photogram.targets.cross_validation import CrossValidation, changes_between
+from photogram.targets.cross_validation import changes_between
 from photogram.targets.drawing import (
     plot_board_residuals,
     plot_cross_validation,
@@ -46,7 +45,7 @@ from photogram.targets.uncertainty import UncertaintyMap, at_distance, map_name
 from photogram.targets.vision import TURNED, transformed
 
 if TYPE_CHECKING:
-    from photogram.targets import Calibrated, Suggestions, Worth
+    from photogram.targets import Calibrated, Worth
 
 
 @np.errstate(over="ignore", invalid="ignore")
@@ -143,7 +142,14 @@ def worth_section(worth: Worth | None) -> Section:
         parts += [Remarks(worth.sentences)] if worth.sentences else []
         made = drawings(worth)
         parts += [Layers("uncertainty", made)] if made else []
-        parts += [Facts("Cross-validation", facts)] if (facts := _tests(worth)) else []
+        facts = []
+        for cross in worth.cross:
+            for (a, b), tests in zip(cross.parts, cross.tests, strict=True):
+                for each in tests:
+                    note = f"chi² of {each.dof}, p {each.probability:.2g}; {len(a)} and {len(b)} views"
+                    tone: Tone = "" if each.explained else "bad"
+                    facts.append(Fact.of(each.name, each.chi2, note=note, tone=tone, figures=3))
+        parts += [Facts("Cross-validation", facts)] if facts else []
     return Section("uncertainty", "Uncertainty of projection", parts, CAPTION)
 
 
@@ -158,23 +164,10 @@ def drawings(worth: Worth) -> list[Drawing]:
                 sketch = partial(plot_cross_validation, cross, own)
                 name = f"cross-validation-{map_name(own)}"
                 found.append(Drawing(name, f"Cross-validation, {_title(own)}", CROSS, sketch))
-    return found + [_of_difference(each) for each in worth.differences]
-
-
-def _tests(worth: Worth) -> list[Fact]:
-    found = []
-    for cross in worth.cross:
-        for (a, b), tests in zip(cross.parts, cross.tests, strict=True):
-            for each in tests:
-                note = f"chi² of {each.dof}, p {each.probability:.2g}; {len(a)} and {len(b)} views"
-                tone: Tone = "" if each.explained else "bad"
-                found.append(Fact.of(each.name, each.chi2, note=note, tone=tone, figures=3))
+    for each in worth.differences:
+        name = f"difference-{each.cameras[0]}-{each.cameras[1]}".replace(" ", "-")
+        found.append(Drawing(name, "Difference", APART, partial(plot_difference, each)))
     return found
-
-
-def _of_difference(found: CameraDifference) -> Drawing:
-    name = f"difference-{found.cameras[0]}-{found.cameras[1]}".replace(" ", "-")
-    return Drawing(name, "Difference", APART, partial(plot_difference, found))
 
 
 def _title(found: UncertaintyMap) -> str:
@@ -182,39 +175,29 @@ def _title(found: UncertaintyMap) -> str:
 
 
 def _members(calibrated: Calibrated) -> dict[str, Any]:
+    board, fit, bend = calibrated.calibration.board, board_fit(calibrated), calibrated.bend
+    points = [
+        Quantity(np.array(board.names, dtype=object), kind="name", member="id"),
+        Quantity(board.places, member="nominal"),
+        Quantity(calibrated.points, member="adjusted"),
+    ]
+    of_board: dict[str, Any] = members(board, "kind", "columns", "rows", "unit")
+    of_board |= {"shape": calibrated.calibration.shape, "points": records(points)}
+    if bend is not None:
+        of_board |= {"bend": bend.position[:2], "bend_covariance": bend.covariance}
+    if fit is not None:
+        of_board |= members(fit, "plane", "rms_out_of_plane")
+        of_board["spacing_ppm"] = dict(zip(STRETCHES, fit.stretch.tolist(), strict=True))
+        of_board["sd_spacing_ppm"] = dict(zip(STRETCHES, fit.sd.tolist(), strict=True))
     sensors = [
         {"camera": calibrated.cameras[row].name, "pose": calibrated.sensors[row]}
         for row in calibrated.sensors_adjusted()
     ]
     return {
-        "board": _board(calibrated),
+        "board": of_board,
         **({"sensors": sensors} if sensors else {}),
         **({} if calibrated.worth is None else worth_members(calibrated.worth)),
     }
-
-
-def _board(calibrated: Calibrated) -> dict[str, Any]:
-    calibration, fit = calibrated.calibration, board_fit(calibrated)
-    board = calibration.board
-    names = np.array(board.names, dtype=object)
-    found: dict[str, Any] = {
-        **members(board, "kind", "columns", "rows", "unit"),
-        "shape": calibration.shape,
-        "points": records(
-            [
-                Quantity(names, kind="name", member="id"),
-                Quantity(board.places, member="nominal"),
-                Quantity(calibrated.points, member="adjusted"),
-            ]
-        ),
-    }
-    if (bend := calibrated.bend) is not None:
-        found |= {"bend": bend.position[:2], "bend_covariance": bend.covariance}
-    if fit is not None:
-        found |= members(fit, "plane", "rms_out_of_plane")
-        found["spacing_ppm"] = dict(zip(STRETCHES, fit.stretch.tolist(), strict=True))
-        found["sd_spacing_ppm"] = dict(zip(STRETCHES, fit.sd.tolist(), strict=True))
-    return found
 
 
 def worth_files(worth: Worth) -> dict[str, bytes]:
@@ -228,43 +211,38 @@ def worth_files(worth: Worth) -> dict[str, bytes]:
 
 def worth_members(worth: Worth) -> dict[str, Any]:
     maps = ("camera", "datum", "noise_only", "model", "distance", "columns", "rows", "sd", "covariances")
+    apart = ("cameras", "distances", "rms", "largest", "columns", "rows", "vectors", "covariances", "remarks")
+    of_motion = {"motion": "fitted.motion", "rotation_deg": "rotation", "shared_corners": "shared"}
+    of_view = {"name": "candidate.name", "pose": "candidate.pose"}
+    of_test = partial(members, p="probability")
+    cross_validation = []
+    for each in worth.cross:
+        splits = [
+            {
+                "views": parts,
+                "tests": [of_test(test, "name", "chi2", "dof") for test in tests],
+                "dk": changes_between(*housings)[0][: each.whole.board.start],
+            }
+            for parts, tests, housings in zip(each.parts, each.tests, each.housings, strict=True)
+        ]
+        cross_validation.append({**members(each, "into", "explained", "factor"), "splits": splits})
     return {
         "maps": [members(each, *maps, largest_where_seen="largest") for each in worth.maps],
-        "cross_validation": [_cross(each) for each in worth.cross],
-        "difference": [_difference(each) for each in worth.differences],
-        "suggested_views": [_suggested(each) for each in worth.suggestions],
+        "cross_validation": cross_validation,
+        "difference": [
+            members(each, *apart, **of_motion)
+            | {"test": each.test and of_test(each.test, "name", "chi2", "dof")}
+            for each in worth.differences
+        ],
+        "suggested_views": [
+            {
+                **members(each, "camera", "distance"),
+                "largest_before": float(np.max(each.before)),
+                "views": [members(view, "corners", "largest", "rms", **of_view) for view in each.views],
+            }
+            for each in worth.suggestions
+        ],
         "worth": worth.sentences,
-    }
-
-
-def _cross(cross: CrossValidation) -> dict[str, Any]:
-    splits = [
-        {
-            "views": parts,
-            "tests": [_test(test) for test in tests],
-            "dk": changes_between(*housings)[0][: cross.whole.board.start],
-        }
-        for parts, tests, housings in zip(cross.parts, cross.tests, cross.housings, strict=True)
-    ]
-    return {**members(cross, "into", "explained", "factor"), "splits": splits}
-
-
-def _test(test: DifferenceTest) -> dict[str, Any]:
-    return members(test, "name", "chi2", "dof", p="probability")
-
-
-def _difference(difference: CameraDifference) -> dict[str, Any]:
-    own = ("cameras", "distances", "rms", "largest", "columns", "rows", "vectors", "covariances", "remarks")
-    others = {"motion": "fitted.motion", "rotation_deg": "rotation", "shared_corners": "shared"}
-    return {**members(difference, *own, **others), "test": difference.test and _test(difference.test)}
-
-
-def _suggested(suggestions: Suggestions) -> dict[str, Any]:
-    names = {"name": "candidate.name", "pose": "candidate.pose"}
-    return {
-        **members(suggestions, "camera", "distance"),
-        "largest_before": float(np.max(suggestions.before)),
-        "views": [members(view, "corners", "largest", "rms", **names) for view in suggestions.views],
     }
 
 

@@ -232,10 +232,7 @@ class Sightings:
 
     @classmethod
     def of_corners(cls, board: Board, corners: Corners) -> Self:
-        """Return the used corners.
-
-        InputError: if points are missing on the board.
-        """
+        """Return the used corners; InputError if points are missing on the board."""
         check_points(corners, board)
         places = board.places
         axes = np.eye(4)
