@@ -8,7 +8,7 @@ from pathlib import Path
 from textwrap import wrap
 
 from photogram.film import Certificate, compare_cameras
-from photogram.film.example import simulated_certificates
+from photogram.film.years import simulated_certificates
 from photogram.show.cells import written
 from photogram.show.forms import table_text
 

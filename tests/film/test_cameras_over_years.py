@@ -11,8 +11,7 @@ import pytest
 from message_codes import coded, has_code
 from photogram import Camera, InputError
 from photogram.film import DatedCamera, compare_cameras
-from photogram.film.example import simulated_certificates
-from photogram.film.years import figures_of
+from photogram.film.years import figures_of, simulated_certificates
 
 ANGLE = math.radians(40)
 NAMES = ("c", "xp", "yp", "A1", "A2", "B1", "B2", "C1", "C2")

@@ -40,15 +40,6 @@ def test_the_same_lens_by_another_name_is_the_same(model):
     assert largest(source, fitted(source, model, (1280, 960)), (1280, 960)) < 1e-6
 
 
-def test_terms_that_are_held_stay():
-    found = fitted(STEREOGRAPHIC, "opencv_fisheye", SIZE, held=["fx", "k3", "k4"])
-    assert found.parameters["fx"] == 1965
-    assert found.parameters["k3"] == found.parameters["k4"] == 0
-    assert found.parameters["k1"] != 0
-    free = {name for name, sd in zip(found.names, found.deviations, strict=True) if sd > 0}
-    assert free == {"fy", "cx", "cy", "k1", "k2"}
-
-
 def test_opencv_names_say_how_many_terms_are_free():
     for count in (4, 5, 8, 12):
         found = fitted(STEREOGRAPHIC, f"opencv{count}", (2000, 1500))
@@ -77,5 +68,3 @@ def test_what_sees_behind_is_known_from_what_does_not():
 def test_what_cannot_be_fitted_is_refused():
     with refusal("error.unknown.close kind=lens model name=opencv9"):
         fitted(STEREOGRAPHIC, "opencv9", SIZE)
-    with refusal("targets.no-held model=opencv_pinhole names=['k9'] known=['fx', 'fy',"):
-        fitted(STEREOGRAPHIC, "opencv5", SIZE, held=["k9"])

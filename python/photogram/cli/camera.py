@@ -52,8 +52,7 @@ def compare_certificates(
     """
     from photogram.errors import InputError
     from photogram.film import Certificate
-    from photogram.film.example import simulated_certificates
-    from photogram.film.years import DatedCamera, compare_cameras
+    from photogram.film.years import DatedCamera, compare_cameras, simulated_certificates
     from photogram.stellar.cameras import camera_from
 
     read: list[Certificate | DatedCamera] = [*simulated_certificates()] if job.is_example else []

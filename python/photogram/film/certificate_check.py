@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Literal, get_args
 
 from photogram.lazy_dataclasses import dataclass, replace
@@ -134,15 +135,10 @@ def _from_coordinates(fields: Sequence[str], typed: Mapping[str, str]) -> float:
 
 def _variants(text: str) -> Iterator[tuple[How, str]]:
     """Yield the numbers that one transcription error produces, once per error type."""
-    seen: set[tuple[How, str]] = set()
-    for how, variant in _slips(text):
-        try:
-            differs = float(variant) != float(text)
-        except ValueError:
-            continue
-        if differs and (how, variant) not in seen:
-            seen.add((how, variant))
-            yield how, variant
+    for how, variant in dict.fromkeys(_slips(text)):
+        with suppress(ValueError):
+            if float(variant) != float(text):
+                yield how, variant
 
 
 def _slips(text: str) -> Iterator[tuple[How, str]]:

@@ -13,6 +13,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.film.certificate_check import DistanceDifference, Explanation, difference_message
 from photogram.film.distances import AdjustedMarks
 from photogram.film.lens_table import Curve, RadialTable
+from photogram.lazy_dataclasses import replace
 from photogram.network.cameras import Camera
 from photogram.show.judgement import verdict_document, verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Part, Section
@@ -33,10 +34,21 @@ CURVE = (
 
 
 def certificate_document(certificate: Certificate) -> Document:
-    facts, verdict, cameras = _facts(certificate), certificate.verdict, _cameras(certificate)
+    facts, verdict, cameras = _facts(certificate), certificate.verdict, list[Camera]()
+    if certificate.c is not None:
+        # The forward camera and, without decentring, the backward one
+        both = certificate.radial is not None and certificate.tangential is None
+        cameras = [certificate.camera(), *([certificate.camera("brown")] if both else [])]
     differences = certificate.check()
     distances = compared(differences)
     mark_parts, of_marks = _marks(certificate)
+    of_cameras = []
+    for camera in cameras:
+        assert camera.covariance is not None
+        names, matrix = camera.covariance
+        covariance = {"order": [*names], "matrix": np.asarray(matrix)}
+        parts = {"parameters": dict(camera.parameters), "covariance": covariance}
+        of_cameras.append({**members(camera, "model", "unit"), **parts})
     lens_parts, of_lens = _lens(certificate)
     return verdict_document(
         verdict,
@@ -59,7 +71,7 @@ def certificate_document(certificate: Certificate) -> Document:
             "remarks": [*map(str, certificate.told())],
             "marks": of_marks,
             "lens": of_lens,
-            "cameras": [_camera_members(each) for each in cameras],
+            "cameras": of_cameras,
         },
     )
 
@@ -97,25 +109,6 @@ def _lens(certificate: Certificate) -> tuple[list[Part], dict[str, Any] | None]:
         "brown_apart_mm": certificate.lens("brown").apart,
         "printed_coefficients_apart_mm": certificate.printed_coefficients(),
     }
-
-
-def _camera_members(camera: Camera) -> dict[str, Any]:
-    assert camera.covariance is not None
-    names, matrix = camera.covariance
-    return {
-        **members(camera, "model", "unit"),
-        "parameters": dict(camera.parameters),
-        "covariance": {"order": [*names], "matrix": np.asarray(matrix)},
-    }
-
-
-def _cameras(certificate: Certificate) -> list[Camera]:
-    """Return the forward camera and, without decentring, the backward one."""
-    if certificate.c is None:
-        return []
-    if certificate.radial is None or certificate.tangential is not None:
-        return [certificate.camera()]
-    return [certificate.camera("brown_forward"), certificate.camera("brown")]
 
 
 def _facts(certificate: Certificate) -> list[Fact]:
@@ -172,6 +165,14 @@ def certificate_findings(certificate: Certificate) -> Findings:
             Tested(kind, curve.standardized, lambda at: phrase("films.reading", angle=float(angles[at[0]])))
         )
         fits += [curve.test] if curve.test else []
+    agreement = []
+    if compared and not beyond:
+        largest = max(abs(each.difference) for each in compared)
+        agreement.append(Phrase("line.distances", {"n": len(compared), "largest": 1e3 * float(largest)}))
+    elif not certificate.places and certificate.distances:
+        adjusted = certificate.fiducials().adjusted
+        assert adjusted is not None
+        agreement.append(Phrase("line.free-figure" if adjusted.free else "line.few-distances"))
     freedom = sum(test.degrees_of_freedom for test in fits)
     squares = sum(test.weighted_sum_of_squares for test in fits)
     return Findings(
@@ -181,7 +182,7 @@ def certificate_findings(certificate: Certificate) -> Findings:
         global_test=global_test(squares, freedom) if freedom else None,
         untested=Phrase("untested.distances" if compared else "untested.redundant"),
         spoiled=phrase("films.contradictions", differences=beyond) if beyond else "",
-        remarks=[*_agreement(certificate), *certificate.told()],
+        remarks=[*agreement, *certificate.told()],
         scaled=False,
         check=Phrase("how.check.certificate"),
         take_out=Phrase("advice.certificate"),
@@ -208,19 +209,6 @@ def _compared(certificate: Certificate) -> Tested:
     return Tested(phrase("films.compared"), np.array(w), lambda at: compared[at[0]].name)
 
 
-def _agreement(certificate: Certificate) -> list[Phrase]:
-    """Return the agreement of distances and coordinates, or the datum of distances."""
-    compared = certificate.check()
-    if compared and not any(each.beyond for each in compared):
-        largest = max(abs(each.difference) for each in compared)
-        return [Phrase("line.distances", {"n": len(compared), "largest": 1e3 * float(largest)})]
-    if certificate.places or not certificate.distances:
-        return []
-    adjusted = certificate.fiducials().adjusted
-    assert adjusted is not None
-    return [Phrase("line.free-figure" if adjusted.free else "line.few-distances")]
-
-
 MM = (Axis("", "mm", small="um", factor=1e3),)
 XY = tuple(Axis(name, "mm", small="um", factor=1e3) for name in "xy")
 OBSERVED = (Axis("length", "mm", small="um", factor=1e3), Axis.turned("angle", "deg"))
@@ -238,16 +226,14 @@ def marks(found: CalibratedMarks) -> Table:
 
 
 def compared(differences: Sequence[DistanceDifference]) -> Table:
-    given, computed, apart = (
-        np.array([getattr(each, name) for each in differences])
-        for name in ("distance", "from_coordinates", "difference")
-    )
+    lengths = partial(of_each, differences, axes=MM, kind="value")
     beyond = np.array([each.beyond for each in differences], bool)
+    apart = np.array([each.difference for each in differences])
     columns = [
         of_each(differences, "name", kind="name", member="distance", head="Distance"),
-        _mm(given, "value", "distance", "Given", 3),
-        _mm(computed, "value", "from_coordinates", "From coordinates", 4),
-        _mm(apart, "deviation", "difference", "Difference", 1, beyond),
+        lengths("distance", member="distance_mm", head="Given", decimals=3),
+        lengths("from_coordinates", member="from_coordinates_mm", head="From coordinates", decimals=4),
+        replace(_mm(apart, "deviation", "difference", "Difference", 1), marked=beyond),
         of_each(differences, "beyond"),
         Quantity([[vars(one) for one in each.explanations] for each in differences], member="explanations"),
     ]
@@ -275,10 +261,8 @@ def explanations(differences: Sequence[DistanceDifference]) -> Table:
     return Table("explanations", "Explained by a single change", columns)
 
 
-def _mm(
-    values: Floats, kind: Kind, member: str, head: str, decimals: int, marked: Bools | None = None
-) -> Quantity:
-    return Quantity(values, MM, kind, member=f"{member}_mm", head=head, decimals=decimals, marked=marked)
+def _mm(values: Floats, kind: Kind, member: str, head: str, decimals: int) -> Quantity:
+    return Quantity(values, MM, kind, member=f"{member}_mm", head=head, decimals=decimals)
 
 
 def observed(found: AdjustedMarks, marked: Bools) -> Table:

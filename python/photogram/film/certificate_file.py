@@ -19,7 +19,6 @@ from photogram.errors import InputError
 from photogram.film.distances import Crossing, MarkDistance, RightAngle
 from photogram.film.lens_table import SEMI_DIAGONALS, RadialTable, Tangential, of_semi_diagonals
 from photogram.film.marks import DataStrip, by_side, turned, turned_name
-from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_columns
 from photogram.io.places import at_place
 from photogram.io.toml import TomlTree, read_document
@@ -105,15 +104,11 @@ class _Frame:
             assert place is not None
             found[name] = place
             if section == "fiducials":
-                self._keep(name, [_text(each) for each in self._typed[section][key]])
+                x, y = (_text(each) for each in self._typed[section][key])
+                if self.data_strip == "top":
+                    x, y = (y[1:] if y.startswith("-") else f"-{y.removeprefix('+')}"), x
+                self.typed |= {f"{name}.x": x, f"{name}.y": y}
         return found
-
-    def _keep(self, name: str, texts: list[str]) -> None:
-        """Store transcribed coordinates, rotated if the strip is at the top."""
-        x, y = texts
-        if self.data_strip == "top":
-            x, y = (y[1:] if y.startswith("-") else f"-{y.removeprefix('+')}"), x
-        self.typed |= {f"{name}.x": x, f"{name}.y": y}
 
     def distances(self, table: TomlTree, sd: float) -> tuple[MarkDistance, ...]:
         found: dict[frozenset[str], MarkDistance] = {}
@@ -201,8 +196,8 @@ def _radial(table: TomlTree, c: float | None, frame: _Frame) -> dict[str, Any]:
         return found | {"radial": RadialTable(angle, values, sd, correlation)}
     singly = {frame.mark(name): outwards * _numbers(own, name, len(angle)) for name in SEMI_DIAGONALS}
     with at_place(own.at("ll")):
-        sd = UM * own["sd_um"].positive() if "sd_um" in own else None
-        mean, sd, remarks = of_semi_diagonals(angle, singly, sd)
+        given = UM * own["sd_um"].positive() if "sd_um" in own else None
+        mean, sd, remarks = of_semi_diagonals(angle, singly, given)
     return found | {"radial": RadialTable(angle, mean, sd, correlation), "remarks": tuple(remarks)}
 
 
@@ -246,7 +241,13 @@ def read_table(path: Path, camera: str | None) -> dict[str, Any]:
     table.require("camera", "fiducial", "x", "y")
     if unknown := [each for each in table.columns if each not in _COLUMNS]:
         raise table.head.error(unknown_name("column", unknown[0], _COLUMNS))
-    rows, name = _rows_of(table, camera)
+    cameras = table.names("camera")
+    if camera is None and len(cameras.names) > 1:
+        raise InputError(phrase("films.choose-camera", cameras=cameras.names), file=table.path)
+    name = cameras.names[0] if camera is None and cameras.names else camera
+    if name is None or name not in cameras.names:
+        raise InputError(unknown_name("camera", str(name), cameras.names), file=table.path)
+    rows = np.flatnonzero(cameras.rows == cameras.names.index(name)).tolist()
     marks = [by_side(each) for each in table.texts("fiducial")]
     use = table.words("use", ("on", "off"))
     on = [row for row in rows if use[row] == "on"]
@@ -270,16 +271,6 @@ def read_table(path: Path, camera: str | None) -> dict[str, Any]:
         "file": path,
         "remarks": (phrase("films.marks-off", marks=left),) if left else (),
     }
-
-
-def _rows_of(table: ColumnTable, camera: str | None) -> tuple[list[int], str]:
-    cameras = table.names("camera")
-    if camera is None and len(cameras.names) > 1:
-        raise InputError(phrase("films.choose-camera", cameras=cameras.names), file=table.path)
-    name = cameras.names[0] if camera is None and cameras.names else camera
-    if name is None or name not in cameras.names:
-        raise InputError(unknown_name("camera", str(name), cameras.names), file=table.path)
-    return np.flatnonzero(cameras.rows == cameras.names.index(name)).tolist(), name
 
 
 def _covariance(path: Path, camera: str, fields: list[str], sd: Floats) -> Floats:

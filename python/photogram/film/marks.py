@@ -7,6 +7,7 @@ and both sides of the film are tested.
 
 from __future__ import annotations
 
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -164,12 +165,20 @@ def which_mark(places: ArrayLike, true: ArrayLike, *, sd: float = 0.004) -> Whic
     if len(p) < 3 or len(q) < len(p):
         raise InputError(phrase("films.few-readings", readings=len(p), marks=len(q)))
     number("sd", sd, "positive")
-    ways = [_tried(q, p, turns, mirrored=mirrored) for mirrored in (False, True) for turns in range(4)]
-    omega = np.array([each[1] for each in ways]) / sd**2
+    every, squares = [], []
+    for mirrored, turns in product((False, True), range(4)):
+        turn = np.linalg.matrix_power(np.array([[0.0, -1.0], [1.0, 0.0]]), turns)
+        marks = _nearest((q * [-1.0, 1.0] if mirrored else q) @ turn.T, p)
+        left = np.full(p.shape, np.inf)
+        if marks is not None:
+            design = np.column_stack([np.ones(len(p)), q[marks]])
+            left = p - design @ np.linalg.lstsq(design, p, rcond=None)[0]
+        squares.append(float((left**2).sum()))
+        every.append(FilmWay(frozen(np.zeros(len(p), np.int64) if marks is None else marks), turns, mirrored))
+    omega = np.array(squares) / sd**2
     best = int(np.argmin(omega))
     if not np.isfinite(omega[best]):
         raise InputError(phrase("films.readings-of-no-marks"))
-    every = [FilmWay(frozen(marks), k % 4, k >= 4) for k, (marks, _) in enumerate(ways)]
     alike = sorted(np.flatnonzero(omega - omega[best] <= DECIDED).tolist(), key=lambda k: k != best)
     return WhichMark(
         marks=every[best].marks,
@@ -180,18 +189,6 @@ def which_mark(places: ArrayLike, true: ArrayLike, *, sd: float = 0.004) -> Whic
         ways=tuple(each if np.isfinite(one) else None for each, one in zip(every, omega, strict=True)),
         alike=tuple(every[k] for k in alike),
     )
-
-
-def _tried(q: Floats, p: Floats, turns: int, *, mirrored: bool) -> tuple[Indices, float]:
-    lain = q * [-1.0, 1.0] if mirrored else q
-    turn = np.linalg.matrix_power(np.array([[0.0, -1.0], [1.0, 0.0]]), turns)
-    lain = lain @ turn.T
-    marks = _nearest(lain, p)
-    if marks is None:
-        return np.zeros(len(p), dtype=np.int64), np.inf
-    design = np.column_stack([np.ones(len(p)), q[marks]])
-    left = p - design @ np.linalg.lstsq(design, p, rcond=None)[0]
-    return marks, float((left**2).sum())
 
 
 def _nearest(lain: Floats, p: Floats) -> Indices | None:

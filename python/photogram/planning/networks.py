@@ -88,12 +88,29 @@ class Plan(Documented):
         drawing = Drawing("picture-plan", title, about("plan.caption"), self.plot)
         layers = partial(_layers, patterns)
         headline = _judgement(patterns) if all(new) else phrase("plan.compared.none")
+        unit, facts = patterns[0].block.linear_unit, []
+        for pattern in (each for each, own in zip(patterns, new, strict=True) if own):
+            x, y, z = pattern.points[-1].rms_sd
+            plane = f"{pattern.axes[0]} {significant(x, 2)}, {pattern.axes[1]} {significant(y, 2)} {unit}"
+            name = f"rms in {pattern.axes[2]}, {pattern.name}"
+            facts.append(Fact.of(name, z, unit, plane, figures=2))
+        note = "standard deviation, mean of all"
+        facts.append(Fact.of("An image error on the ground", patterns[0].unit, unit, note, figures=2))
+        # Each message once, with the names of its patterns unless it concerns all
+        messages: dict[str, list[str]] = {}
+        for pattern in patterns:
+            for message in pattern.result.messages:
+                messages.setdefault(str(message), []).append(pattern.name)
+        remarks = [
+            text if len(concerned) == len(patterns) else f"{'; '.join(concerned)}: {text}"
+            for text, concerned in messages.items()
+        ]
         return Document(
             what="Prediction of a network before it is flown",
             title=patterns[0].block.title,
             judgements=[Judgement("Prediction", str(headline))],
             advice=advice(patterns),
-            highlights=_highlights(patterns),
+            highlights=facts,
             sections=[
                 Section("network", "Plan of the network", [drawing] if any(new) else []),
                 Section("comparison", "Side by side", [_comparison(patterns)] if all(new) else []),
@@ -103,7 +120,7 @@ class Plan(Documented):
                 layers("motion", "Motion", _motion),
                 layers("control", "Control", _control, about("plan.control")),
                 layers("undetected", "Undetected errors", _undetected, about("plan.undetected")),
-                remarks_section(_remarks(patterns)),
+                remarks_section(remarks),
             ],
             details=[layers("multiples", "New points, in standard deviations of an image", _multiples)],
             members=_members(patterns),
@@ -315,19 +332,6 @@ def _judgement(patterns: Sequence[Pattern]) -> Phrase:
     return phrase("plan.compared.better", ratio=heights[worst] / heights[best], **figures)
 
 
-def _highlights(patterns: Sequence[Pattern]) -> list[Fact]:
-    unit = patterns[0].block.linear_unit
-    facts = []
-    for pattern in patterns:
-        if pattern.new_points.any():
-            x, y, z = pattern.points[-1].rms_sd
-            plane = f"{pattern.axes[0]} {significant(x, 2)}, {pattern.axes[1]} {significant(y, 2)} {unit}"
-            name = f"rms in {pattern.axes[2]}, {pattern.name}"
-            facts.append(Fact.of(name, z, unit, plane, figures=2))
-    note = "standard deviation, mean of all"
-    return [*facts, Fact.of("An image error on the ground", patterns[0].unit, unit, note, figures=2)]
-
-
 def _comparison(patterns: Sequence[Pattern]) -> Table:
     unit, names = patterns[0].block.linear_unit, [pattern.name for pattern in patterns]
     groups = [pattern.points[-1] for pattern in patterns]
@@ -390,18 +394,6 @@ def advice(patterns: Sequence[Pattern]) -> list[Phrase]:
 def _improvements(pattern: Pattern) -> list[float]:
     known = pattern.known_rms_sd or ()
     return [sd / better for sd, better in zip(pattern.points[-1].rms_sd, known, strict=False)]
-
-
-def _remarks(patterns: Sequence[Pattern]) -> list[str]:
-    """Return each message once, with the names of its patterns unless it concerns all."""
-    names: dict[str, list[str]] = {}
-    for pattern in patterns:
-        for message in pattern.result.messages:
-            names.setdefault(str(message), []).append(pattern.name)
-    return [
-        text if len(concerned) == len(patterns) else f"{'; '.join(concerned)}: {text}"
-        for text, concerned in names.items()
-    ]
 
 
 def _panel(pattern: Pattern, limits: Floats, shades: Shades) -> Panel:

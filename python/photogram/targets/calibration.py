@@ -32,7 +32,7 @@ from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corners import Corners, check_points
 from photogram.targets.motion import MAX_GAP_SECONDS, POWERS, dated, moved, moving, pictures_in_motion
 from photogram.targets.options import Regularisation, Shape, Synchronisation
-from photogram.targets.rounds import better_start, checked_clocks, has_knots, marked_as_mrcal, weighted_block
+from photogram.targets.rounds import better_start, checked_clocks, marked_as_mrcal, weighted_block
 from photogram.targets.vision import FLIP, photo_poses, transformed
 from photogram.words import phrase
 
@@ -374,7 +374,7 @@ class Calibration(Valued, Brief):
         rounds = 0
         while True:
             # Only priors determine knots without image observations.
-            free = None if has_knots(start) else adjust(start.block(), **how)
+            free = None if any(each.knot_unknowns for each in start.cameras) else adjust(start.block(), **how)
             if free is None:
                 result = adjust(weighted_block(start), **how, tolerance=SPLINE_TOLERANCE)
             elif start.regularise is None:
@@ -411,7 +411,7 @@ class Calibration(Valued, Brief):
         RankError, AdjustmentError, OutOfMemoryError, KeyboardInterrupt
             As in :func:`photogram.snoop`.
         """
-        if self.regularise is not None and not has_knots(self):
+        if self.regularise is not None and not any(each.knot_unknowns for each in self.cameras):
             raise InputError(phrase("targets.priors"))
         start = self.adjust().calibration if self.sync == "offset" else self
         snooped = snoop(weighted_block(start), options, **changes)

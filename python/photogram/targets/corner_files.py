@@ -181,12 +181,12 @@ def _of_table(table: ColumnTable, board: Board | None) -> Measured:
 def _points(table: ColumnTable, board: Board | None) -> Indices:
     if "point" in table:
         names = {name: k for k, name in enumerate(board.names)} if board is not None else None
-        found = np.empty(table.count, dtype=np.int64)
-        for row, cell in enumerate(table.texts("point")):
-            number = (int(cell) if cell.isdecimal() else None) if names is None else names.get(cell)
-            if number is None:
-                raise table.cell_error(row, "point", "targets.no-point", point=cell)
-            found[row] = number
+        cells = table.texts("point")
+        numbers = (int(cell) if cell.isdecimal() else -1 for cell in cells)
+        known = numbers if names is None else (names.get(cell, -1) for cell in cells)
+        found = np.fromiter(known, np.int64, len(cells))
+        for row in np.flatnonzero(found < 0).tolist()[:1]:
+            raise table.cell_error(row, "point", "targets.no-point", point=cells[row])
         return found
     if board is None:
         raise table.head.error(phrase("targets.needs-board"))

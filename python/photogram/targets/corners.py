@@ -256,7 +256,15 @@ def grouped(measured: Measured, how: CalibrationOptions) -> tuple[Corners, list[
     pictures = [measured.images[row] for row in kept]
     if len(set(pictures)) < len(pictures):
         pictures = [f"{names[row]}/{measured.images[row]}" for row in kept]
-    sizes = {**measured.sizes, **_sizes_of_pictures(measured, names, kept, how)}
+    common: dict[str, Size] = {}  # of the images of each camera, if known
+    for row in kept if measured.picture_sizes else ():
+        width, height = measured.picture_sizes[row]
+        wide, high = how.size or common.setdefault(names[row], (width, height))
+        if (wide, high) != (width, height):
+            fields = {"width": width, "height": height, "wide": wide, "high": high}
+            message = phrase("targets.sizes", picture=measured.images[row], **fields)
+            raise InputError(message, file=measured.path)
+    sizes = {**measured.sizes, **common}
     shift = 0.5 if how.pixel_origin == "corner" else 0.0
     with at_place(Place(measured.path)):
         corners = Corners(
@@ -273,21 +281,6 @@ def grouped(measured: Measured, how: CalibrationOptions) -> tuple[Corners, list[
             use=measured.use[own],
         )
     return corners, messages
-
-
-def _sizes_of_pictures(
-    measured: Measured, names: Sequence[str], rows: list[int], how: CalibrationOptions
-) -> dict[str, Size]:
-    """Return the common size of the images of each camera, if known."""
-    found: dict[str, Size] = {}
-    for row in rows if measured.picture_sizes else ():
-        width, height = measured.picture_sizes[row]
-        wide, high = how.size or found.setdefault(names[row], (width, height))
-        if (wide, high) != (width, height):
-            fields = {"width": width, "height": height, "wide": wide, "high": high}
-            message = phrase("targets.sizes", picture=measured.images[row], **fields)
-            raise InputError(message, file=measured.path)
-    return found
 
 
 def _cameras_and_views(

@@ -260,15 +260,31 @@ def first_values(
     without = {corners.pictures[row]: in_a_plane for row in np.flatnonzero(seen.in_a_plane()).tolist()}
     without |= corners.poor(board.places)
     usable = np.array([name not in without for name in corners.pictures], dtype=bool)
-    cameras, remarks = _cameras(seen, corners, usable, without, model, knots)
+    cameras, remarks = [], list[Message]()
+    for k, name in enumerate(corners.camera_names):
+        own = seen.of((corners.cameras == k) & usable)
+        if not len(own.xy):
+            lost = [corners.pictures[row] for row in np.flatnonzero(corners.cameras == k).tolist()]
+            reasons = [f"{each} ({without[each]})" for each in lost] or ["none"]
+            raise InputError(phrase("targets.few-corners", camera=name, pictures=reasons))
+        size = picture_size(own, corners.sizes[k])
+        if corners.sizes[k] is None:
+            fields = {"camera": name, "width": size[0], "height": size[1]}
+            remarks.append(Message(phrase("targets.assumed-size", **fields)))
+        camera, messages = first_camera(own, size, name, model, knots)
+        cameras.append(camera)
+        remarks += messages
     there = np.isfinite(_rays(seen, corners.cameras, cameras)).all(axis=2)
     hidden = usable & (np.count_nonzero(there, axis=1) < MIN_CORNERS_PER_VIEW)
     if (hidden == usable).all():
         raise InputError(phrase("targets.no-pose", model=cameras[0].model))
     without |= {corners.pictures[row]: hidden_corners for row in np.flatnonzero(hidden).tolist()}
-    pictures = Pictures(seen, list(corners.pictures), corners.cameras, cameras, usable & ~hidden)
-    orders, fits, of_orders = pictures.ordered()
-    made = pictures.adjusted(orders, fits)
+    rows, orders = np.flatnonzero(usable & ~hidden), np.zeros(len(usable), dtype=np.int64)
+    names = [corners.pictures[row] for row in rows.tolist()]
+    pictures = Pictures(seen.of(rows), names, corners.cameras[rows], cameras)
+    orders[rows], fits, of_orders = pictures.ordered()
+    made = np.full((len(usable), 4, 4), np.nan)
+    made[rows] = pictures.adjusted(orders[rows], fits)
     rig = connected(made, corners.cameras, corners.views, len(cameras), seen.listings.turns)
     for order, turn in seen.listings.turns.items():
         made[rig.turned == order] = made[rig.turned == order] @ inverted(turn)
@@ -289,31 +305,6 @@ def first_values(
         without=without,
         remarks=remarks,
     )
-
-
-def _cameras(
-    seen: Sightings,
-    corners: Corners,
-    usable: Bools,
-    without: dict[str, Phrase],
-    model: str | None,
-    knots: tuple[int, int],
-) -> tuple[list[Camera], list[Message]]:
-    cameras, remarks = [], []
-    for k, name in enumerate(corners.camera_names):
-        own = seen.of((corners.cameras == k) & usable)
-        if not len(own.xy):
-            pictures = [corners.pictures[row] for row in np.flatnonzero(corners.cameras == k).tolist()]
-            reasons = [f"{each} ({without[each]})" for each in pictures] or ["none"]
-            raise InputError(phrase("targets.few-corners", camera=name, pictures=reasons))
-        size = picture_size(own, corners.sizes[k])
-        if corners.sizes[k] is None:
-            fields = {"camera": name, "width": size[0], "height": size[1]}
-            remarks.append(Message(phrase("targets.assumed-size", **fields)))
-        camera, messages = first_camera(own, size, name, model, knots)
-        cameras.append(camera)
-        remarks += messages
-    return cameras, remarks
 
 
 def _of_rig(rig: Rig, corners: Corners) -> list[Message]:
@@ -352,23 +343,23 @@ def _rays(seen: Sightings, of_cameras: Indices, cameras: list[Camera]) -> Floats
     return found
 
 
+def _limit(misfit: Floats) -> float:
+    return max(MAX_VIEW_MISFIT * float(np.median(misfit.min(axis=1))), MIN_MISFIT_RAD)
+
+
 @dataclass(frozen=True, eq=False)
 class Pictures:
+    """P images with enough corners."""
+
     seen: Sightings  # Board observations in the images
     names: list[str]  # P names
     of_cameras: Indices  # (P,) camera of each image
     cameras: list[Camera]  # The cameras, with their initial values
-    usable: Bools  # (P,) whether an image has enough corners; rays are computed only for these
 
     def adjusted(self, orders: Indices, fits: Bools) -> Floats:
-        """Return (P, 4, 4) poses board -> camera for corner orders (P,); NaN if unknown.
-
-        Poses of images that fit (P,) are adjusted with fixed cameras.
-        """
-        rows, seen = np.flatnonzero(self.usable), self.seen.listed(orders)
-        found = np.full((len(orders), 4, 4), np.nan)
-        rays = _rays(seen.of(rows), self.of_cameras[rows], self.cameras)
-        found[rows] = poses(ray_homographies(seen.coordinates, rays))
+        """Return (P, 4, 4) poses board -> camera for corner orders (P,), adjusted if they fit (P,)."""
+        seen = self.seen.listed(orders)
+        found = poses(ray_homographies(seen.coordinates, _rays(seen, self.of_cameras, self.cameras)))
         for k, camera in enumerate(self.cameras):
             own = (self.of_cameras == k) & fits
             held = camera.replace(sd=0.0, knot_sd=None)
@@ -384,32 +375,23 @@ class Pictures:
         most. By default this is the front, x to the right and y down. Otherwise, the first order with both
         properties is used.
         """
-        misfit, front = self._tried()
-        best = misfit.min(axis=1, keepdims=True)
-        limit = self._limit(misfit)
-        fits = (misfit <= limit) & (misfit <= np.maximum(EQUAL_MISFIT_RATIO * best, MIN_MISFIT_RAD))
-        fits[:, 0] |= misfit[:, 0] <= limit
-        side = 1.0 if front[fits[:, 0], 0].sum() > 0 else -1.0
-        right = fits & (front == side)
-        orders = np.zeros(len(self.usable), dtype=np.int64)
-        orders[self.usable] = np.argmax(right, axis=1)
-        fit = np.zeros(len(self.usable), dtype=bool)
-        fit[self.usable] = fits.any(axis=1)
-        return orders, fit, self._told(orders, fits, right)
-
-    def _tried(self) -> tuple[Floats, Floats]:
-        """Return misfits (rad) of usable images by order, and z signs of their cameras."""
-        rows, listings = np.flatnonzero(self.usable), self.seen.listings
+        listings, rows = self.seen.listings, np.arange(len(self.names))
+        # Misfits (rad) by order, and z signs of the cameras
         misfit = np.full((len(rows), len(listings.points)), np.inf)
         front = np.full(misfit.shape, -1.0)
         for order in listings.shapes:
             misfit[:, order], front[:, order] = self._in_order(order, rows)
-        odd = misfit[:, 0] > self._limit(misfit)
+        odd = misfit[:, 0] > _limit(misfit)
         odd |= front[:, 0] != (1.0 if front[~odd, 0].sum() > 0 else -1.0)
-        others = {*range(len(listings.points))} - {*listings.shapes} if odd.any() else ()
-        for order in others:
+        for order in {*range(len(listings.points))} - {*listings.shapes} if odd.any() else ():
             misfit[odd, order], front[odd, order] = self._in_order(order, rows[odd])
-        return misfit, front
+        best, limit = misfit.min(axis=1, keepdims=True), _limit(misfit)
+        fits = (misfit <= limit) & (misfit <= np.maximum(EQUAL_MISFIT_RATIO * best, MIN_MISFIT_RAD))
+        fits[:, 0] |= misfit[:, 0] <= limit
+        side = 1.0 if front[fits[:, 0], 0].sum() > 0 else -1.0
+        right = fits & (front == side)
+        orders = np.argmax(right, axis=1)
+        return orders, fits.any(axis=1), self._told(orders, fits, right)
 
     def _in_order(self, order: int, rows: Indices) -> tuple[Floats, Floats]:
         seen = self.seen.of(rows).listed(np.full(len(rows), order))
@@ -420,13 +402,8 @@ class Pictures:
             return misfit, np.full(len(rows), -1.0)
         return misfit, np.sign(centres(poses(found))[:, 2])
 
-    @staticmethod
-    def _limit(misfit: Floats) -> float:
-        return max(MAX_VIEW_MISFIT * float(np.median(misfit.min(axis=1))), MIN_MISFIT_RAD)
-
-    def _told(self, orders: Indices, fits: Bools, right: Bools) -> list[Message]:
-        names = np.array(self.names)[self.usable]
-        own = orders[self.usable]
+    def _told(self, own: Indices, fits: Bools, right: Bools) -> list[Message]:
+        names = np.array(self.names)
         mirrored = fits.any(axis=1) & (~right.any(axis=1) | (fits[:, 0] & (own > 0)))
         other = right.any(axis=1) & ~mirrored
         remarks = []

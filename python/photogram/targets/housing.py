@@ -26,7 +26,6 @@ from photogram.network.cameras import Camera
 from photogram.targets.options import DatumName
 from photogram.targets.vision import (
     cross_matrices,
-    has_unknown_knots,
     imaged,
     motion_partials,
     points_at,
@@ -176,9 +175,9 @@ def housing_of(calibrated: Calibrated, camera: int = 0) -> tuple[Housing, int]:
         views = np.unique(corners.views[np.isin(corners.cameras, cameras)])
         poses, block = calibrated.poses[views], calibrated.block
         rows, count = _board_rows(calibrated), len(calibrated.points)
-        by_board = np.zeros((count, 3, len(rows), 3))
-        by_board[rows, :, np.arange(len(rows))] = np.eye(3)
-        by_board = by_board.reshape(count, 3, -1)
+        by_points = np.zeros((count, 3, len(rows), 3))
+        by_points[rows, :, np.arange(len(rows))] = np.eye(3)
+        by_board = by_points.reshape(count, 3, -1)
         if calibrated.bend is not None:
             by_board = calibrated.calibration.board.shifts().transpose(0, 2, 1)
         used = calibrated.used_images & np.isin(corners.cameras[block.image_photos], cameras)
@@ -271,14 +270,8 @@ def _weights(calibrated: Calibrated, cameras: list[int]) -> Floats:
 POINTS_PER_BATCH = 4096
 
 
-def datum_rows(
-    housing: Housing, camera: int, datum: DatumName, fixed: tuple[Floats, Floats, bool] | None = None
-) -> Floats:
-    """Return (6, c + 6) T of a camera by the name of a datum.
-
-    For `image`, `fixed` contains (n, 3) fixed points in camera axes, their (n, 2, 2) weights W, and whether
-    they are at finite distances.
-    """
+def datum_rows(housing: Housing, camera: int, datum: DatumName) -> Floats:
+    """Return (6, c + 6) T of a camera by the name of a datum; 0 for `image`, which depends on a distance."""
     one_of("datum", datum, get_args(DatumName))
     found = np.zeros((6, housing.common + 6))
     own = housing.parameters(camera)
@@ -288,8 +281,6 @@ def datum_rows(
             weights = np.eye(2) / sd[:, np.newaxis, np.newaxis] ** 2
             fixing[camera] = fixed_points(housing.cameras[camera], places, weights)
         found[:, own] = fixing[camera]
-    elif datum == "image" and fixed is not None:
-        found[:, own] = fixed_points(housing.cameras[camera], *fixed)
     elif datum == "mean-frames":
         turn, shift = housing.sensors[camera, :3, :3], housing.sensors[camera, :3, 3]
         # p' = R p + t:  R (dt + w x p) + dt_s + w_s x R p  with R p = p' - t.
@@ -310,7 +301,7 @@ def fixed_points(camera: Camera, points: Floats, weights: Floats, finite: bool =
     normal, right = np.zeros((6, 6)), np.zeros((6, np.count_nonzero(unknown_of(camera))))
     for start in range(0, len(points), POINTS_PER_BATCH):
         part = slice(start, start + POINTS_PER_BATCH)
-        images = (touched if has_unknown_knots(camera) else imaged)(camera, points[part])
+        images = (touched if np.any(camera.knot_sd) else imaged)(camera, points[part])
         by_motion = images.by_point @ motion_partials(points[part], finite)
         weighted = weights[part] @ by_motion
         normal += weighted.reshape(-1, 6).T @ by_motion.reshape(-1, 6)
@@ -371,7 +362,7 @@ def projection_cofactors(
     for start in range(0, len(pixels), PIXELS_PER_BATCH):
         part = slice(start, start + PIXELS_PER_BATCH)
         points = points_at(own, pixels[part], [distance])
-        if not has_unknown_knots(own):
+        if not np.any(own.knot_sd):
             found[part] = of_functions(point_partials(own, points, finite), cofactors)
             continue
         images = touched(own, points)

@@ -6,7 +6,7 @@ The motion of its axes may be fitted with it, or alone for the comparison of two
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from itertools import compress
 from types import MappingProxyType
 from typing import Literal, Self
@@ -83,15 +83,23 @@ class Points:
             damping, close = MIN_DAMPING, SPLINE_TOLERANCE
         cost, rows, misses = self.linearized(at, free, moving)
         for _ in range(MAX_STEPS):
-            step = _damped(rows, misses, damping)
+            scale = np.linalg.norm(rows, axis=0)
+            scale[scale == 0] = 1.0
+            scaled = rows / scale
+            normal, right = scaled.T @ scaled, scaled.T @ misses
+            normal[np.diag_indices(len(normal))] += damping
+            # Damping separates the many knots at the edge, which the data do not.
+            many = len(normal) > MAX_UNKNOWNS_WITH_RANK
+            found = np.linalg.solve(normal, right) if many else np.linalg.lstsq(normal, right, rcond=None)[0]
+            step = found / scale
             trial = at.stepped(free, moving, step) if np.isfinite(step).all() else at
-            found, *others = self.linearized(trial, free, moving)
-            if not found < cost:
+            lower, *others = self.linearized(trial, free, moving)
+            if not lower < cost:
                 damping *= 10
                 if damping > MAX_DAMPING:
                     break
                 continue
-            fall, at, cost, (rows, misses) = cost - found, trial, found, others
+            fall, at, cost, (rows, misses) = cost - lower, trial, lower, others
             damping = max(damping / 10, MIN_DAMPING)
             if fall <= close * cost:
                 break
@@ -115,19 +123,6 @@ class Points:
         """Return (m, 2) projections, partials by points (m, 2, 3) and values (m, 2, p)."""
         images, by_u, by_values = at.camera.partials(transformed(at.motion, self.points) * TURNED)
         return images, by_u * TURNED, by_values
-
-
-def _damped(rows: Floats, misses: Floats, damping: float) -> Floats:
-    scale = np.linalg.norm(rows, axis=0)
-    scale[scale == 0] = 1.0
-    scaled = rows / scale
-    normal = scaled.T @ scaled
-    normal[np.diag_indices(len(normal))] += damping
-    right = scaled.T @ misses
-    # Damping separates the many knots at the edge, which the data do not.
-    many = len(normal) > MAX_UNKNOWNS_WITH_RANK
-    found = np.linalg.solve(normal, right) if many else np.linalg.lstsq(normal, right, rcond=None)[0]
-    return np.asarray(found / scale)
 
 
 # `opencv_pinhole` with this number of free lens terms
@@ -179,7 +174,14 @@ def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int,
         raise InputError(phrase("targets.no-lens", model=model))
     if constants:
         raise InputError(phrase("targets.constants", model=model, names=sorted(constants)))
-    start = _start(source, size, "w" in names)
+    given = source.parameters
+    if "cx" not in given or not ({"f", "fx"} & {*given}):
+        raise InputError(phrase("targets.no-focal", camera=source.title, model=source.model))
+    fx, fy = given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0))
+    start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1], **dict(_INITIAL_TERMS)}
+    # cx and cy count from the first pixel, or in models with w and h from the image centre
+    shifts = ("w" in source.names) - ("w" in names)
+    start |= {"cx": given["cx"] + shifts * size[0] / 2, "cy": given["cy"] + shifts * size[1] / 2}
     free = {*names} - {"w", "h", *_FIXED_TERMS} if count is None else {*names[: 4 + count]}
     if splined:
         if min(knots) < ORDER + 1:
@@ -197,17 +199,6 @@ def lens_of(model: str, source: Camera, size: tuple[int, int], knots: tuple[int,
     )
 
 
-def _start(source: Camera, size: tuple[int, int], from_middle: bool) -> dict[str, float]:
-    given = source.parameters
-    if "cx" not in given or not ({"f", "fx"} & {*given}):
-        raise InputError(phrase("targets.no-focal", camera=source.title, model=source.model))
-    fx, fy = given.get("fx", given.get("f", 0.0)), given.get("fy", given.get("f", 0.0))
-    start = {"f": fx, "fx": fx, "fy": fy, "w": size[0], "h": size[1], **dict(_INITIAL_TERMS)}
-    # cx and cy count from the first pixel, or in models with w and h from the image centre
-    shifts = ("w" in source.names) - from_middle
-    return start | {"cx": given["cx"] + shifts * size[0] / 2, "cy": given["cy"] + shifts * size[1] / 2}
-
-
 def field_of(rays: Floats, knots: tuple[int, int], order: float = ORDER) -> float:
     """Return the fov_x_deg (degrees) of knots that cover (n, 3) rays in photo axes."""
     places = 2 * rays[:, :2] / (1 - rays[:, 2:])
@@ -220,7 +211,6 @@ def fitted(
     source: Camera,
     model: str,
     size: tuple[int, int],
-    held: Collection[str] = (),
     *,
     radius: float = math.inf,
     knots: tuple[int, int] = KNOTS,
@@ -229,18 +219,13 @@ def fitted(
 
     The sum of squares of the differences is minimised over 60 x 40 source pixels, within `radius` of the
     image centre. Focal length and principal point are fitted first, then the lens terms in the order k1, k2,
-    p, all others. `model` and `knots` are defined in :func:`lens_of`. Parameters in `held` are fixed: focal
-    length and principal point to the values of the source, lens terms to 0. The others are free in the
-    result.
+    p, all others. `model` and `knots` are defined in :func:`lens_of`.
     """
     start = lens_of(model, source, size, knots)
-    if unknown := sorted({*held} - {*start.names}):
-        fields = {"model": start.model, "names": unknown, "known": list(start.names)}
-        raise InputError(phrase("targets.no-held", **fields))
     xy = grid_of_pixels(size, radius)
     shown = Points(rays(source, xy), xy)
     there = shows(start, shown.points)
-    free = [name for name in free_names(start) if name not in held]
+    free = free_names(start)
     if 2 * np.count_nonzero(there) < len(free) and start.knots is None:
         raise InputError(phrase("targets.shows-nothing", model=model, camera=source.title))
     return fitted_in_stages(Moved(start), Points(shown.points[there], xy[there]), free).camera.replace(

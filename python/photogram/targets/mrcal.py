@@ -342,12 +342,12 @@ def valid_region(found: UncertaintyMap, largest: float) -> Floats:
     last = np.array(found.size) - 1.0
     inside = ((places >= 0) & (places <= last)).all(axis=2)
     # Bilinear interpolation of the map
-    parts = []
-    for axis, nodes in enumerate((found.columns, found.rows)):
-        across = np.clip(places[..., axis], 0, last[axis])
-        own = np.clip(np.searchsorted(nodes, across, side="right") - 1, 0, len(nodes) - 2)
-        parts.append((own, (across - nodes[own]) / (nodes[own + 1] - nodes[own])))
-    (i, x), (j, y) = parts
+    fractions = [
+        np.interp(places[..., axis], nodes, np.arange(len(nodes)))
+        for axis, nodes in enumerate((found.columns, found.rows))
+    ]
+    i, j = (np.clip(each.astype(int), 0, n - 2) for each, n in zip(fractions, sd.shape[::-1], strict=True))
+    x, y = fractions[0] - i, fractions[1] - j
     with np.errstate(invalid="ignore"):
         upper = sd[j, i] * (1 - x) + sd[j, i + 1] * x
         lower = sd[j + 1, i] * (1 - x) + sd[j + 1, i + 1] * x

@@ -233,16 +233,13 @@ def read_arrays(path: Path, data: bytes) -> Arrays:
             check_unpacked_size(path, members)
             require(sum(each.file_size for each in members), f"{path}: arrays")
             for member in members:
-                name = member.filename.removesuffix(".npy")
-                arrays[name] = _array(path, name, archive.read(member))
+                name, content = member.filename.removesuffix(".npy"), io.BytesIO(archive.read(member))
+                try:
+                    arrays[name] = np.lib.format.read_array(content, allow_pickle=False)
+                except Exception as error:  # any error of the parser for a damaged header
+                    message = phrase("targets.array-damaged", name=name, reason=str(error))
+                    raise InputError(message, file=path) from None
     except UNPACKABLE as error:
         message = phrase("error.parse", format="archive of arrays (npz)", reason=str(error))
         raise InputError(message, file=path) from None
     return Arrays(path, arrays)
-
-
-def _array(path: Path, name: str, content: bytes) -> NDArray[Any]:
-    try:
-        return np.lib.format.read_array(io.BytesIO(content), allow_pickle=False)
-    except Exception as error:  # any error of the parser for a damaged header
-        raise InputError(phrase("targets.array-damaged", name=name, reason=str(error)), file=path) from None

@@ -42,10 +42,6 @@ def _numbers(text: str, count: int | None, form: str) -> list[float]:
     return found
 
 
-def _deviations(text: str) -> tuple[float, ...]:
-    return tuple(_numbers(text, 2, "two numbers, such as 1,0.1"))
-
-
 def _offsets(texts: Sequence[str]) -> dict[str, tuple[float, float]]:
     """Return clock offsets with standard deviations from `right=0,0.01`."""
     offsets = {}
@@ -118,7 +114,9 @@ class CalibrationOptions(Checked):
     pixel_origin: PixelOrigin = "center"
     model: str | None = None
     knots: tuple[int, int] | None = option(None, kind=str, parse=pair)
-    knot_sd: tuple[float, float] | None = option(None, kind=str, parse=_deviations)
+    knot_sd: tuple[float, float] | None = option(
+        None, kind=str, parse=lambda text: tuple(_numbers(text, 2, "two numbers, such as 1,0.1"))
+    )
     sd0: float | None = option(None, kind=list[str], parse=_corner_sd, name="--sd")
     regularise: Regularisation | None = None
 

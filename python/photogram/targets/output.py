@@ -93,43 +93,39 @@ def opencv_yaml(rig: Rig) -> dict[str, bytes]:
         ["opencv5", "opencv8", "opencv12", "opencv_fisheye"],
         lambda lens: lens.fewest((4,) if lens.fisheye else COUNTS) is not None,
     )
-    return {
-        f"{name}.yaml": "\n".join(["%YAML:1.0", "---", *_opencv_camera(rig, row, lenses), ""]).encode()
-        for row, name in enumerate(rig.files)
-    }
-
-
-def _opencv_camera(rig: Rig, row: int, lenses: list[OpencvLens]) -> list[str]:
-    lens, (width, height), calibrated = lenses[row], rig.size(row), rig.calibrated
-    terms = lens.first(4) if lens.fisheye else lens.fewest(COUNTS[COUNTS.index(MIN_PINHOLE_TERMS) :])
-    lines = [f"image_width: {width}", f"image_height: {height}"]
-    lines += ["fisheye_model: 1"] if lens.fisheye else []
-    lines += _matrix("camera_matrix", lens.matrix)
-    lines += _matrix("distortion_coefficients", np.reshape(terms or [], (-1, 1)))
-    if calibrated is not None:
-        corners = calibrated.calibration.corners
-        squares = (calibrated.residuals**2).sum(axis=1)
-        pictures = corners.picture[corners.use]
-        own = np.flatnonzero(corners.cameras == row)
-        mean = [squares[pictures == picture].mean() for picture in own if (pictures == picture).any()]
-        average = squares[corners.cameras[pictures] == row].mean()
-        lines.append(f"avg_reprojection_error: {float(np.sqrt(average))!r}")
-        lines += _matrix("per_view_reprojection_errors", np.sqrt(mean).reshape(-1, 1))
-        camera = calibrated.cameras[row]
-        sd = dict(zip(camera.names, camera.sd.tolist(), strict=True))
-        sd |= {"fx": sd["f"], "fy": sd["f"]} if "f" in sd else {}
-        sd |= {"k1": sd["k"]} if "k" in sd else {}
-        lines += _matrix("std_deviations_intrinsics", [[sd.get(name, 0.0)] for name in DEVIATIONS])
-    if row and rig.tied(row):
-        # R, T of camera 0 -> this camera, E = [T]x R, and F = K^-T E K0^-1, scaled.
-        rotation, shift = rig.sensors[row, :3, :3], rig.sensors[row, :3, 3]
-        essential = cross_matrices(shift) @ rotation
-        fundamental = np.linalg.inv(lens.matrix).T @ essential @ np.linalg.inv(lenses[0].matrix)
-        if fundamental[2, 2]:
-            fundamental = fundamental / fundamental[2, 2]
-        named = (("R", rotation), ("T", shift.reshape(3, 1)), ("E", essential), ("F", fundamental))
-        lines += [line for name, values in named for line in _matrix(name, values)]
-    return lines
+    files = {}
+    for row, name in enumerate(rig.files):
+        lens, (width, height), calibrated = lenses[row], rig.size(row), rig.calibrated
+        terms = lens.first(4) if lens.fisheye else lens.fewest(COUNTS[COUNTS.index(MIN_PINHOLE_TERMS) :])
+        lines = [f"image_width: {width}", f"image_height: {height}"]
+        lines += ["fisheye_model: 1"] if lens.fisheye else []
+        lines += _matrix("camera_matrix", lens.matrix)
+        lines += _matrix("distortion_coefficients", np.reshape(terms or [], (-1, 1)))
+        if calibrated is not None:
+            corners = calibrated.calibration.corners
+            squares = (calibrated.residuals**2).sum(axis=1)
+            pictures = corners.picture[corners.use]
+            own = np.flatnonzero(corners.cameras == row)
+            mean = [squares[pictures == picture].mean() for picture in own if (pictures == picture).any()]
+            average = squares[corners.cameras[pictures] == row].mean()
+            lines.append(f"avg_reprojection_error: {float(np.sqrt(average))!r}")
+            lines += _matrix("per_view_reprojection_errors", np.sqrt(mean).reshape(-1, 1))
+            camera = calibrated.cameras[row]
+            sd = dict(zip(camera.names, camera.sd.tolist(), strict=True))
+            sd |= {"fx": sd["f"], "fy": sd["f"]} if "f" in sd else {}
+            sd |= {"k1": sd["k"]} if "k" in sd else {}
+            lines += _matrix("std_deviations_intrinsics", [[sd.get(key, 0.0)] for key in DEVIATIONS])
+        if row and rig.tied(row):
+            # R, T of camera 0 -> this camera, E = [T]x R, and F = K^-T E K0^-1, scaled.
+            rotation, shift = rig.sensors[row, :3, :3], rig.sensors[row, :3, 3]
+            essential = cross_matrices(shift) @ rotation
+            fundamental = np.linalg.inv(lens.matrix).T @ essential @ np.linalg.inv(lenses[0].matrix)
+            if fundamental[2, 2]:
+                fundamental = fundamental / fundamental[2, 2]
+            named = (("R", rotation), ("T", shift.reshape(3, 1)), ("E", essential), ("F", fundamental))
+            lines += [line for key, values in named for line in _matrix(key, values)]
+        files[f"{name}.yaml"] = "\n".join(["%YAML:1.0", "---", *lines, ""]).encode()
+    return files
 
 
 def ros_camera_info(rig: Rig) -> dict[str, bytes]:

@@ -50,13 +50,24 @@ if TYPE_CHECKING:
 
 @np.errstate(over="ignore", invalid="ignore")
 def calibration_page(calibrated: Calibrated, page: Document) -> Document:
-    worth = calibrated.worth
+    worth, uncertainty = calibrated.worth, list[Part]()
+    if worth is not None:
+        uncertainty += [Remarks(worth.sentences)] if worth.sentences else []
+        uncertainty += [Layers("uncertainty", made)] if (made := drawings(worth)) else []
+        facts = []
+        for cross in worth.cross:
+            for (a, b), tests in zip(cross.parts, cross.tests, strict=True):
+                for each in tests:
+                    note = f"chi² of {each.dof}, p {each.probability:.2g}; {len(a)} and {len(b)} views"
+                    tone: Tone = "" if each.explained else "bad"
+                    facts.append(Fact.of(each.name, each.chi2, note=note, tone=tone, figures=3))
+        uncertainty += [Facts("Cross-validation", facts)] if facts else []
     tables = [
         Table("splines", "Splined lenses", splines(calibrated), about=KNOTS),
         Table("moved_by_priors", "Changes by priors of cameras", prior_shift(calibrated)),
     ]
     sections = [
-        worth_section(worth),
+        Section("uncertainty", "Uncertainty of projection", uncertainty, CAPTION),
         Section("board", "Board", [Facts("The board", board_facts(calibrated))]),
         Section.of(
             Table(
@@ -133,24 +144,6 @@ def worth_facts(worth: Worth) -> list[Fact]:
         )
         for each in worth.maps
     ]
-
-
-def worth_section(worth: Worth | None) -> Section:
-    """Return the uncertainty section, without parts if nothing was requested."""
-    parts: list[Part] = []
-    if worth is not None:
-        parts += [Remarks(worth.sentences)] if worth.sentences else []
-        made = drawings(worth)
-        parts += [Layers("uncertainty", made)] if made else []
-        facts = []
-        for cross in worth.cross:
-            for (a, b), tests in zip(cross.parts, cross.tests, strict=True):
-                for each in tests:
-                    note = f"chi² of {each.dof}, p {each.probability:.2g}; {len(a)} and {len(b)} views"
-                    tone: Tone = "" if each.explained else "bad"
-                    facts.append(Fact.of(each.name, each.chi2, note=note, tone=tone, figures=3))
-        parts += [Facts("Cross-validation", facts)] if facts else []
-    return Section("uncertainty", "Uncertainty of projection", parts, CAPTION)
 
 
 def drawings(worth: Worth) -> list[Drawing]:

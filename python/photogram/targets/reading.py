@@ -70,7 +70,13 @@ def read(
     if chosen.knots is not None and (models or chosen.model != KNOTTED):
         raise InputError(phrase("targets.knots-of", model=KNOTTED))
     if models:
-        calibration = _of_models(path, models, corners, own)
+        if corners or own is not None:
+            raise InputError(phrase("targets.own-corners", name=models[0].name), file=path)
+        calibration = read_model(models[0])
+        for other in models[1:]:
+            if read_model(other) != calibration:
+                names = {"first": models[0].name, "second": other.name}
+                raise InputError(phrase("targets.other-calibration", **names), file=path)
         prior = None if chosen.knot_sd and not regularise else regularise or calibration.regularise
         cameras_of_model = with_knot_sd(calibration.cameras, chosen.knot_sd, prior)
         if sync != "known" or chosen.offsets:
@@ -128,19 +134,6 @@ def board_of(options: CalibrationOptions, described: Sequence[Path]) -> Board | 
         names = [each.name for each in described]
         raise InputError(phrase("targets.boards", count=len(described), names=names), file=described[1])
     return read_board(described[0]) if described else None
-
-
-def _of_models(
-    path: Path, models: Sequence[Path], corners: dict[Form, list[Path]], board: Board | None
-) -> Calibration:
-    if corners or board is not None:
-        raise InputError(phrase("targets.own-corners", name=models[0].name), file=path)
-    calibration = read_model(models[0])
-    for other in models[1:]:
-        if read_model(other) != calibration:
-            names = {"first": models[0].name, "second": other.name}
-            raise InputError(phrase("targets.other-calibration", **names), file=path)
-    return calibration
 
 
 def _measured(path: Path, corners: dict[Form, list[Path]], board: Board | None) -> Measured:

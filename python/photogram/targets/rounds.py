@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.arrays import argument_error
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools
 from photogram.errors import InputError, RankError
 from photogram.messages import Message
 from photogram.network.cameras import Camera
@@ -142,10 +142,6 @@ def _in_motion(start: Calibration, result: Result) -> Calibration:
     return start if (gaps <= MIN_CHANGE * result.photo_sd[pictures, :3]).all() else again
 
 
-def has_knots(start: Calibration) -> bool:
-    return any(each.knot_unknowns for each in start.cameras)
-
-
 NOTABLE_POSE_ERROR, MAX_POSE_ERROR = 0.01, 0.2  # relative motion errors: warning, error for a free offset
 
 
@@ -156,35 +152,29 @@ def checked_clocks(calibrated: Calibrated) -> list[Message]:
     v'v, weighted by the poses. Its standard deviation is too small as well.
     """
     messages = []
-    start, result = calibrated.calibration, calibrated
+    start = calibrated.calibration
+    photos = [calibrated.block.photo_ids[row] for row in calibrated.photos.tolist()]
     corners, sd = start.corners, np.asarray(start.sd_offsets)
-    shares = _shares(calibrated)
+    count, scale = len(photos), calibrated.covariance_scale
+    # (V,) expected squared speeds from pose errors, and observed ones
+    joint = (calibrated.covariance([("step", photos)]) / scale).reshape(count, 6, count, 6)
+    own = joint[np.arange(count), :, np.arange(count)]
+    speeds = np.nan_to_num(np.asarray(start.motion)[:, 0])
+    squares = np.einsum("vi,vi->v", speeds, np.linalg.solve(own, speeds[..., np.newaxis])[..., 0])
+    by_errors = errors_of_speeds(dated(corners, start.tied), start.references_of_views())
+    expected = 6 * np.nan_to_num(by_errors) * scale
     for camera, each in enumerate(calibrated.cameras):
         if each.name not in calibrated.offsets or sd[camera] == 0:
             continue
         views = np.unique(corners.views[corners.cameras == camera])
-        share = float(shares[0, views].sum() / shares[1, views].sum())
+        share = float(expected[views].sum() / squares[views].sum())
         if share > MAX_POSE_ERROR and np.isinf(sd[camera]):
-            photos = [result.block.photo_ids[row] for row in calibrated.photos[views].tolist()]
             what = str(phrase("targets.offset", camera=each.name))
             message = phrase("targets.offset.weigh", camera=each.name, share=share)
-            raise RankError(message, photos, [], [each.name], what)
+            raise RankError(message, [photos[view] for view in views.tolist()], [], [each.name], what)
         if share > NOTABLE_POSE_ERROR:
             messages.append(Message(phrase("targets.offset.small", camera=each.name, share=share)))
     return messages
-
-
-def _shares(calibrated: Calibrated) -> Floats:
-    """Return (2, V): expected squared speeds from pose errors, and observed ones."""
-    start, result = calibrated.calibration, calibrated
-    steps = ("step", [result.block.photo_ids[row] for row in calibrated.photos.tolist()])
-    joint = result.covariance([steps]) / result.covariance_scale
-    count = len(calibrated.photos)
-    own = joint.reshape(count, 6, count, 6)[np.arange(count), :, np.arange(count)]
-    speeds = np.nan_to_num(np.asarray(start.motion)[:, 0])
-    there = np.einsum("vi,vi->v", speeds, np.linalg.solve(own, speeds[..., np.newaxis])[..., 0])
-    by_errors = errors_of_speeds(dated(start.corners, start.tied), start.references_of_views())
-    return np.stack([6 * np.nan_to_num(by_errors) * result.covariance_scale, there])
 
 
 REMOVAL_FACTOR, OUTLIER_FACTOR = 5.0, 4.0  # multiples of the rms: start of removal, removed corners

@@ -83,7 +83,7 @@ def triangulated(
     """Return points from image points (n, k, 2) in k cameras of a housing, k >= 2.
 
     `pixel_sd` is the sd of an image coordinate. `still` (6, c + 6) is the motion of the axes of camera 0 with
-    the unknowns (:func:`~photogram.targets.projection.housing_rows`) for points fixed to the housing. None:
+    the unknowns (:func:`~photogram.targets.housing.housing_rows`) for points fixed to the housing. None:
     points are fixed to the axes of camera 0.
     """
     points, by_pixels = _intersected(housing, cameras, pixels, pixel_sd)

@@ -20,6 +20,7 @@ from photogram.summaries import Brief, Rows
 from photogram.targets.housing import (
     camera_number,
     datum_rows,
+    fixed_points,
     housing_of,
     projection_cofactors,
     size_of,
@@ -226,12 +227,14 @@ def projection_uncertainty(
     housing, own = housing_of(result, number)
     if noise_only:
         housing = housing.noise_only()
-    away, fixed = checked_distance(distance), None
+    away, rows = checked_distance(distance), datum_rows(housing, own, datum)
     if datum == "image":
         points = points_at(housing.cameras[own], image_grid(size_of(result, number), IMAGE_GRID)[2], [away])
         points = points[np.isfinite(points).all(axis=1)]
-        fixed = points, np.broadcast_to(np.eye(2), (len(points), 2, 2)), bool(np.isfinite(away))
-    rows = datum_rows(housing, own, datum, fixed)
+        weights = np.broadcast_to(np.eye(2), (len(points), 2, 2))
+        rows[:, housing.parameters(own)] = fixed_points(
+            housing.cameras[own], points, weights, bool(np.isfinite(away))
+        )
     found = housing.variance * projection_cofactors(housing, own, where, distance, rows)
     seen = result.cameras[number].camera
     if seen.knots is not None:

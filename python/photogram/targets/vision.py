@@ -139,10 +139,6 @@ def touched(camera: Camera, points: Floats) -> Imaged:
     return Imaged(xy, by_u * TURNED, found, columns)
 
 
-def has_unknown_knots(camera: Camera) -> bool:
-    return bool(unknown_of(camera)[len(camera.names) :].any())
-
-
 def unknown_of(camera: Camera) -> Bools:
     """Return which parameters of a camera, followed by its knots, are unknown."""
     unknown = camera.deviations > 0
