@@ -116,13 +116,9 @@ def orient(
     one_of("start", start, get_args(Start))
     whole_number("max_iterations", max_iterations)
     rejected = tuple(names_of("reject", reject))
-    positive = {
-        "max_iterations": max_iterations,
-        "tolerance": tolerance,
-        "scale": 1.0 if scale is None else scale,
-    }
-    for name, value in positive.items():
-        number(name, value, "positive")
+    number("max_iterations", max_iterations, "positive")
+    number("tolerance", tolerance, "positive")
+    number("scale", 1.0 if scale is None else scale, "positive")
     if trace and method == "rigorous":
         raise InputError(phrase("orientation.trace"))
     if unknown := [name for name in rejected if name not in stations.ids]:
@@ -141,19 +137,16 @@ def orient(
             np.where(used, stations.control_sd, np.inf)[rows],
             stations.model[rows],
             np.ones((len(rows), 3)) if stations.model_sd is None else stations.model_sd[rows],
-            **{
-                "former": None,
-                "max_iterations": max_iterations,
-                "tolerance": tolerance,
-                "trace": False,
-                **({} if scale is None else {"scale": scale}),
-                **options,
-            },
+            **{"max_iterations": max_iterations, "former": None, "trace": False, **options},
+            **({} if scale is None else {"scale": scale}),
+            tolerance=tolerance,
             threads=0,
         )
 
+    known = former.similarity if isinstance(former, Orientation) else former
+    row = known and (known.scale, known.rotation.tolist(), known.translation.tolist())
     try:
-        solution = solve(control, method=method, start=start, former=_parameters(former), trace=trace)
+        solution = solve(control, method=method, start=start, former=row, trace=trace)
     except _photocore.SimilarityError as error:
         raise _named(stations, used, rows, scale is not None, *error.args) from None
     if not np.isfinite(solution.sum_of_squares):
@@ -166,7 +159,7 @@ def orient(
         except _photocore.SimilarityError:
             return None
         usable = found.status == "converged" and np.isfinite(found.sum_of_squares)
-        return Fit(found.sum_of_squares, found.similarity[1][2][2]) if usable else None
+        return (found.sum_of_squares, found.similarity[1][2][2]) if usable else None
 
     messages, grave = _doubts(result, rows, control, solution, fit)
     return replace(result, messages=messages, grave=grave)
@@ -197,12 +190,12 @@ def _doubts(
             degrees_of_freedom=result.degrees_of_freedom,
             orient=fit,
         )
-        grave = [Message(hint.message) for hint in hints if hint.accepted]
-        messages[:0] = [Message(hint.message) for hint in hints if not hint.accepted]
+        grave = [Message(text) for text, accepted in hints if accepted]
+        messages[:0] = [Message(text) for text, accepted in hints if not accepted]
     if not grave and result.rms > NO_FIT * size and (result.test is None or result.test.rejected_high):
         grave.append(Message.of("orientation.no-fit", percent=100 * result.rms / size))
     elif not grave and _in_a_plane(model[np.isfinite(control[:, 2])], result.rms, size):
-        here = Fit(solution.sum_of_squares, float(result.similarity.rotation[2, 2]))
+        here = solution.sum_of_squares, float(result.similarity.rotation[2, 2])
         if open_question := undecided(control, here, rounding, fit):
             messages.append(Message(open_question))
     covariance = result.similarity.tangent_covariance
@@ -216,13 +209,6 @@ def _in_a_plane(model: Floats, rms: float, size: float) -> bool:
     """Whether points are in a plane within the residuals."""
     off_plane = float(np.linalg.svd(model - model.mean(axis=0), compute_uv=False)[-1]) / math.sqrt(len(model))
     return len(model) <= 3 or off_plane <= IN_A_PLANE * rms + ROUNDING * size
-
-
-def _parameters(former: Similarity | Orientation | None) -> _photocore.ParametersRow | None:
-    similarity = former.similarity if isinstance(former, Orientation) else former
-    if similarity is None:
-        return None
-    return similarity.scale, similarity.rotation.tolist(), similarity.translation.tolist()
 
 
 def _orientation(

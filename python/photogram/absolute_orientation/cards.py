@@ -30,8 +30,6 @@ MISSING = ("", "-")
 
 @dataclass(frozen=True, eq=False)
 class Deck:
-    """Cards of part I."""
-
     stations: Stations  # The station records
     former: Similarity | None  # The approximate parameters of the first record; None if its words are zeros
     identification: str  # The last word of the constants

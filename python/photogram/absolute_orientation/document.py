@@ -36,7 +36,6 @@ STARTS = {
 
 
 def orientation_document(result: Orientation) -> Document:
-    """Return the document of an orientation."""
     stations, (size, quality) = result.stations, _facts(result)
     caption = "The control in plan with its residuals, given minus transformed, enlarged as the scale says."
     drawing = Drawing("picture-residuals", "Residuals of the control in plan", caption, result.plot)
@@ -68,7 +67,6 @@ def orientation_document(result: Orientation) -> Document:
 
 
 def _facts(result: Orientation) -> tuple[list[Fact], list[Fact]]:
-    """Return facts on size and on quality."""
     given, scale = result.used.sum(axis=0).tolist(), result.similarity.scale
     model, ground = result.stations.model_unit, result.stations.ground_unit
     done = len(result.iterations) if result.cycles is None else len(result.cycles)
@@ -140,7 +138,6 @@ def without_points(result: Orientation) -> bytes:
 
 
 def point_rows(ids: Iterable[str], positions: Floats, covariances: Floats) -> bytes:
-    """Return the members of points."""
     rows = zip(ids, positions.tolist(), covariances.tolist(), strict=True)
     return json.elements({"id": name, "position": place, "covariance": own} for name, place, own in rows)
 
@@ -225,7 +222,6 @@ def model_residuals(result: Orientation) -> Table:
 
 
 def rejected(result: Orientation) -> Table:
-    """Return unused control: given minus transformed."""
     there = result.stations.given & ~result.used
     rows = np.flatnonzero(there.any(axis=1))
     differences = np.where(there, result.differences, np.nan)
@@ -264,13 +260,11 @@ def parameters(result: Orientation) -> Table:
 
 
 def rotation(result: Orientation) -> Table:
-    """Return the rotation matrix A."""
     matrix = Quantity(result.similarity.rotation, _axes("XYZ"), head="{}", decimals=12)
     return Table("rotation_matrix", "Rotation matrix A", [matrix])
 
 
 def points(result: Orientation) -> Table:
-    """Return the stations without control, transformed."""
     ids, positions, covariances = result.transform_points()
     sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     axes = _axes("XYZ", result.stations.ground_unit)
@@ -286,7 +280,6 @@ def points(result: Orientation) -> Table:
 
 
 def cycles(result: Orientation) -> Table:
-    """Return the iterations, or the cycles of the report's methods."""
     if result.cycles is None:
         columns = iteration_table(result.iterations)
     else:

@@ -14,7 +14,6 @@ from itertools import combinations
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.lazy_dataclasses import dataclass
 from photogram.statistics.likelihood import judged
 from photogram.words import Phrase, phrase
 
@@ -34,33 +33,12 @@ ROUNDING = 1e-5  # The same for coordinates of a few digits
 UNITS = {FOOT: "feet", 1 / FOOT: "metres"}
 
 
-@dataclass(frozen=True)
-class Fit:
-    """A trial orientation: its sum of squares, and a33, the cosine of its tilt."""
-
-    sum_of_squares: float
-    upright: float
-
-
-@dataclass(frozen=True)
-class Hint:
-    """An explanation of the residuals."""
-
-    message: Phrase
-    accepted: bool  # Whether it is significant
-
-
+Fit = tuple[float, float]
+"""Of a trial orientation: its sum of squares, and a33, the cosine of its tilt."""
 Orient = Callable[[Floats], Fit | None]
 """Orients the model with changed control; returns None on failure."""
-
-
-@dataclass(frozen=True, eq=False)
-class Trial:
-    """A hypothesis and its sum of squares."""
-
-    text: Phrase
-    control: Floats
-    sum_of_squares: float
+Trial = tuple[Phrase, Floats, float]
+"""A hypothesis, its control, and its sum of squares."""
 
 
 def find(
@@ -72,35 +50,35 @@ def find(
     rounding: float,
     degrees_of_freedom: int,
     orient: Orient,
-) -> list[Hint]:
-    """Try possible mistakes and return the ones that explain the residuals.
+) -> list[tuple[Phrase, bool]]:
+    """Try possible mistakes and return the ones that explain the residuals, and whether significantly.
 
     `control` (n, 3) is NaN if not used. `placed` are the control coordinates of the model by the given
     orientation, with its sum of squares and degrees of freedom. A sum of squares up to `rounding` is rounding
     only.
     """
-    hints: list[Hint] = []
+    hints: list[tuple[Phrase, bool]] = []
     now = sum_of_squares
     while len(hints) < MOST:
         tried = trials(names, control, placed, rounding, orient)
-        verdict = judged(now, [trial.sum_of_squares for trial in tried], degrees_of_freedom)
+        verdict = judged(now, [squares for *_, squares in tried], degrees_of_freedom)
         if verdict is None:
             break
         best = [tried[place] for place in verdict.best]
         kind = "probable" if verdict.accepted else "possible"
-        causes = [trial.text for trial in best]
+        causes = [text for text, *_ in best]
         text = phrase(f"orientation.{kind}", causes=causes, factor=float(verdict.fall))
-        hints.append(Hint(text, verdict.accepted))
+        hints.append((text, verdict.accepted))
         if not verdict.accepted:
             break
-        control, now = best[0].control, best[0].sum_of_squares
+        _, control, now = best[0]
     return hints
 
 
 def trials(names: list[str], control: Floats, placed: Floats, rounding: float, orient: Orient) -> list[Trial]:
     """Orient the model by hypotheses, mistakes of the set first; see :func:`find`."""
     return [
-        Trial(text, changed, max(fit.sum_of_squares, rounding))
+        (text, changed, max(fit[0], rounding))
         for text, changed in _hypotheses(names, control, placed)
         if (fit := orient(changed)) is not None
     ]
@@ -114,17 +92,12 @@ def _hypotheses(names: list[str], control: Floats, placed: Floats) -> Iterator[t
     yield phrase("orientation.axis-in-feet", axis="Y"), control * [1.0, FOOT, 1.0]
     suspects = _suspects(control, control - placed)
     for row in suspects:
-        changes: list[tuple[Phrase, Floats]] = []
-        if np.isfinite(control[row, :2]).all():
-            exchanged = phrase("orientation.axes-exchanged", station=names[row])
-            changes.append((exchanged, control[row, [1, 0, 2]]))
-        for factor, unit in UNITS.items():
-            in_unit = phrase(f"orientation.station-in-{unit}", station=names[row])
-            changes.append((in_unit, control[row] * factor))
-        for text, changed in changes:
+        changes = {"axes-exchanged": control[row, [1, 0, 2]]} if np.isfinite(control[row, :2]).all() else {}
+        changes |= {f"station-in-{unit}": control[row] * factor for factor, unit in UNITS.items()}
+        for code, changed in changes.items():
             whole = control.copy()
             whole[row] = changed
-            yield text, whole
+            yield phrase(f"orientation.{code}", station=names[row]), whole
     for one, other in _pairs(control, placed, suspects):
         whole = control.copy()
         whole[[one, other]] = control[[other, one]]
@@ -174,8 +147,8 @@ def undecided(control: Floats, fit: Fit, rounding: float, orient: Orient) -> Phr
     `control` (n, 3) is NaN if it is not used; a sum of squares up to `rounding` is rounding only.
     """
     mirrored = orient(control * [1.0, 1.0, -1.0])
-    if mirrored is None or mirrored.sum_of_squares > AS_WELL * fit.sum_of_squares + rounding:
+    if mirrored is None or mirrored[0] > AS_WELL * fit[0] + rounding:
         return None
     # In the mirror image, the third axis has the opposite direction.
-    is_upside_down = fit.upright < 0 < -mirrored.upright
+    is_upside_down = fit[1] < 0 < -mirrored[1]
     return phrase("orientation.plane.upside-down" if is_upside_down else "orientation.plane")

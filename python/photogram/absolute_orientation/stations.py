@@ -161,7 +161,6 @@ def header(place: Place) -> list[str]:
 
 
 def spelling(name: str) -> str:
-    """Return the standard name of a column."""
     return SPELLINGS.get(name, name)
 
 

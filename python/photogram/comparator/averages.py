@@ -79,7 +79,6 @@ class PlateAverages:
 def average_residuals(
     grid: Grid, cases: Sequence[PlacedCase], residuals: Sequence[Residuals]
 ) -> PlateAverages:
-    """Average the residuals of one stage of the adjustment over all cases of a plate."""
     left_handed = cases[0].orientation.left_handed
     rows = [grid.rows_of(case.points) for case in cases]
     values = [
@@ -170,7 +169,6 @@ class ListedGridSigma:
 
 
 def listed_grid_sigma(averages: PlateAverages) -> ListedGridSigma:
-    """Compute the standard deviations of the listing."""
     points, cases = len(averages.points), len(averages.cases)
     squares = (averages.grid_um**2).sum(axis=0)
     mean = math.sqrt(float(squares.sum()) / (2 * points - 1))

@@ -167,8 +167,6 @@ SCALES = (0.5, 2.0)  # outside it, units of measurements and grid differ
 
 @dataclass(frozen=True, eq=False)
 class PlacedCase:
-    """Case with its means."""
-
     case: Case
     readings: list[PointReadings]  # in grouping order
     points: Indices  # (n,) point numbers and numbers of readings
@@ -180,7 +178,6 @@ class PlacedCase:
 
     @property
     def number(self) -> int:
-        """Case number."""
         return self.case.number
 
     @property

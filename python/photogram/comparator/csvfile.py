@@ -25,7 +25,6 @@ Keys = Mapping[str, Callable[[Place, str, str], Any]]
 
 
 def text_of(place: Place, text: str, key: str) -> str:
-    """Return the text of a setting."""
     del place, key
     return text
 
@@ -53,8 +52,6 @@ def settings_lines(values: Mapping[str, object]) -> list[str]:
 
 @dataclass(frozen=True)
 class Table:
-    """Table with coordinates and settings."""
-
     records: ColumnTable
     settings: Mapping[str, Any]
     places: Mapping[str, Place]  # Lines of the settings

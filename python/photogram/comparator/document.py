@@ -51,7 +51,6 @@ JOINT = "All cases, comparator, polynomials and grid in one adjustment, with the
 
 
 def calibration_document(calibration: Calibration) -> Document:
-    """Return the document of a calibration."""
     session, verdict, screening = calibration.session, calibration.verdict, calibration.screening
     own, nonlinear, tests = calibration.linear, calibration.nonlinear, calibration.polynomial_tests
     by_variance, of_cases = variance(calibration), cases(calibration)
@@ -193,7 +192,6 @@ def _members(calibration: Calibration) -> dict[str, Any]:
 
 
 def _pointing(calibration: Calibration) -> dict[str, Any]:
-    """Return the precision by point, by case, by operator, and in total."""
     pointing, placed = calibration.pointing, [case.placed for case in calibration.cases]
     return {
         "points": [

@@ -164,8 +164,6 @@ AFFINE_LOST = 3.0
 
 @dataclass(frozen=True, eq=False)
 class AffineFit:
-    """Linear fit of one case."""
-
     coefficients: Floats  # (2, 2) and (2,): comparator = coefficients grid + shift (equation 40)
     shift_um: Floats
     parameters: Decomposition  # Scales, lack of orthogonality, rotation

@@ -44,8 +44,6 @@ class Weights:
 
 @dataclass(frozen=True, eq=False)
 class JointCase:
-    """Case after the joint adjustment."""
-
     number: int  # Number of the case
     rotation_rad: float  # grid = M(rotation) corrected + translation, in the handedness of the comparator
     translation_um: Floats
@@ -78,8 +76,6 @@ class JointPlate:
 
 @dataclass(frozen=True, eq=False)
 class JointFit:
-    """Result of the joint adjustment."""
-
     correction: Correction  # Comparator and polynomials with their joint covariance
     # Standard deviation of unit weight; dimensionless, 1 for correct weights. Covariances are scaled by its
     # square

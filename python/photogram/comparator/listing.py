@@ -101,7 +101,6 @@ PRINTED = frozenset(f"comparators.{name}" for name in ("special-grid", "legs", "
 
 
 def title_page(calibration: Calibration, run_date: str = "") -> list[str]:
-    """Return the title page with plates, options and optional problems."""
     session = calibration.session
     left_handed = calibration.cases[0].placed.orientation.left_handed
     lines = centred(f"COMPARATOR CALIBRATION - photogram {_photocore.__version__}")
@@ -140,7 +139,6 @@ def _grid(grid: Grid, left_handed: bool) -> list[str]:
 
 
 def input_page(case: CaseResult) -> list[str]:
-    """Return the original readings of a case, and the close-out."""
     own = case.placed.case
     lines = [f"INPUT DATA CASE ORDER NUMBER {own.number}   PLATE {own.plate}   OPERATOR {own.operator}"]
     lines.append("  " + f"{'LEG':>3}{'POINT':>6}{'X':>12}{'Y':>12}    " * COLUMNS)
@@ -178,7 +176,6 @@ POINTING_HEAD = [
 
 
 def pointing_pages(calibration: Calibration) -> list[list[str]]:
-    """Return the pages on pointing precision."""
     pages = [_case_page(case) for case in calibration.cases]
     for operator, (points, total) in calibration.pointing.operators.items():
         own = [case for case in calibration.cases if case.placed.case.operator == operator]
@@ -249,7 +246,6 @@ AVERAGES_HEAD = [
 
 
 def averages_page(title: str, result: PlateResult) -> list[str]:
-    """Return a page of average residuals of one plate."""
     averages, listed = result.averages, result.listed
     first = averages.by_location[0] if averages.by_location else None
     located = dict(zip(first.locations.tolist(), first.residuals_um.tolist(), strict=True)) if first else {}
@@ -314,7 +310,6 @@ ROWS_OF_AXES = 4  # lines of the analysis of variance with values of both axes
 
 
 def linear_lines(found: Correction | Decomposition, covariance: Floats) -> list[str]:
-    """Return scales and lack of orthogonality with their covariances."""
     (x, y, ratio, lean), sd, less_one = (column.values for column in linear(found, covariance).columns[1:])
     of_x, of_y, of_ratio = (f"{value:10.4f} MICRONS/METER" for value in less_one[:3])
     return [
@@ -328,7 +323,6 @@ def linear_lines(found: Correction | Decomposition, covariance: Floats) -> list[
 
 
 def polynomial_lines(polynomial: Polynomial, covariance: Floats) -> list[str]:
-    """Return the coefficients in metre units with standard deviations."""
     (x, y), sd = polynomial.coefficients, np.sqrt(np.diag(covariance))
     lines = [
         "  CORRECTION = A X**4 + B Y**4 + C X**3 + D Y**3 + E X**2 + F Y**2 + G X + H Y + J   (METERS)",
@@ -350,7 +344,6 @@ def covariance_lines(fit: SinglePolynomial | CombinedPolynomial) -> list[str]:
 
 
 def case_linear_page(case: CaseResult) -> list[str]:
-    """Return the page of the linear adjustment of one case."""
     fit = case.linear
     own, sd = fit.parameters, math.sqrt(fit.covariance[3, 3]) / ARCSEC
     rotation = f"  ROTATION {angle(own.rotation_rad)}   SIGMA {sd:8.3f} SEC"
@@ -359,13 +352,11 @@ def case_linear_page(case: CaseResult) -> list[str]:
 
 
 def case_polynomial_page(case: CaseResult, single: SinglePolynomial) -> list[str]:
-    """Return the page of the polynomials of one case."""
     title = f"CASE NUMBER {case.number} NONLINEAR ADJUSTMENT"
     return residual_page(title, case, single.residuals, [*covariance_lines(single), ""])
 
 
 def combined_linear_page(calibration: Calibration) -> list[str]:
-    """Return the page of the combined linear adjustment."""
     combined = calibration.linear
     placements = [
         f"  CASE {case.number:3d}  ROTATION {angle(fit.rotation_rad)}   TRANSLATION"
@@ -443,7 +434,6 @@ def correction_table(calibration: Calibration, case: CaseResult | None = None) -
 
 
 def summary_page(calibration: Calibration) -> list[str]:
-    """Return the summary page: analysis of variance, linear parameters, polynomials."""
     session, combined, nonlinear = calibration.session, calibration.linear, calibration.nonlinear
     operators = ", ".join(str(operator) for operator in calibration.pointing.operators)
     plates = ", ".join(str(plate) for plate in calibration.plates)
@@ -464,7 +454,6 @@ def summary_page(calibration: Calibration) -> list[str]:
 
 
 def variance_lines(calibration: Calibration) -> list[str]:
-    """Return the analysis of variance, standard deviations in micrometres."""
     names = [
         "RMS ERROR BEFORE CALIBRATION",
         "AFTER LINEAR CORRECTIONS",
@@ -487,12 +476,10 @@ WIDTH = 110
 
 
 def centred(title: str) -> list[str]:
-    """Return a title with a blank line below."""
     return [title.center(WIDTH), ""]
 
 
 def nearest(case: CaseResult) -> str:
-    """Return the orientation line of a case."""
     point = case.placed.orientation.nearest_point
     return f"GRID POINT {point} IS NEAREST THE COMPARATOR ORIGIN"
 
@@ -505,14 +492,12 @@ def number(value: float | None, width: int, decimals: int) -> str:
 
 
 def angle(radians: float) -> str:
-    """Return an angle in degrees, minutes and seconds of arc."""
     degrees, minutes, seconds = degrees_minutes_seconds(radians, 3)
     sign = "-" if radians < 0 and (degrees or minutes or seconds) else " "
     return f"{sign}{degrees:3d} DEG {minutes:2d} MIN {seconds:6.3f} SEC"
 
 
 def triangle(names: Iterable[str], matrix: Floats) -> list[str]:
-    """Return the lower triangle of a covariance matrix, with names."""
     rows = []
     for row, name in enumerate(names):
         values = "".join(f"{value:13.5E}" for value in np.asarray(matrix)[row, : row + 1])
@@ -529,12 +514,10 @@ HEAD = [
 def residual_page(
     title: str, case: CaseResult, residuals: Residuals, parameters: Sequence[str] = ()
 ) -> list[str]:
-    """Return a page of parameters and residuals."""
     return [*centred(title), nearest(case), "", *parameters, *residual_lines(residuals)]
 
 
 def residual_lines(residuals: Residuals) -> list[str]:
-    """Return the table of residuals with its sums, in micrometres."""
     rows = zip(
         residuals.points.tolist(),
         residuals.xy_um.tolist(),
@@ -553,6 +536,5 @@ def residual_lines(residuals: Residuals) -> list[str]:
 
 
 def sums(name: str, values: Iterable[float], width: int, gap: int) -> str:
-    """Return a line of sums in both systems."""
     x, y, grid_x, grid_y = (number(value, 11, 4) for value in values)
     return f"  {name:<{width}}{x}{y}{'':{gap}}{grid_x}{grid_y}"

@@ -1,6 +1,9 @@
 """Measurement files: card decks or plain tables.
 
-Tables have the columns case, point, x_um, y_um and optionally plate, leg, operator.
+Tables have the columns case, point, x_um, y_um and optionally plate, leg, operator. A deck (NOAA TR NOS 57,
+section II) consists of a header card, data cards in the order measured, and one blank card. Decks follow each
+other. A header with comparator number 0 (a blank card) ends the job. Blanks in numbers count as zeros, as on
+the CDC 6600.
 """
 
 from __future__ import annotations
@@ -26,22 +29,6 @@ from photogram.words import Phrase, phrase
 SPECIAL_GRID, MAX_COMPARATOR = 3, 15
 CASES = 20  # operators in a header
 MAX_LEG = 4
-
-
-@dataclass(frozen=True)
-class Header:
-    """The header card, FORMAT (5I1,I2,A1,1X,20I3,2X,A8,I1)."""
-
-    left_handed: bool  # Columns 1 to 5
-    sorted_input: bool
-    other_least_count: bool  # Not one micrometre (comparator 11 has separate unit digits)
-    skip_card: bool  # Skip one card before the data
-    plot_each_case: bool  # As in the text (the listing reverses it)
-    comparator: int  # Columns 6-7; 0 ends the job
-    secondary: bool  # Column 8 holds R: the right stage of a stereocomparator
-    operators: tuple[int, ...]  # Columns 10-69: operator of each case, 0 if none
-    date: str  # Columns 72-79
-    master: int  # Column 80: 0 grid 773, 1 grid 1320, 2 grid 778, 3 special coordinates follow
 
 
 @dataclass(frozen=True)
@@ -93,36 +80,6 @@ def _micrometres(record: Record, columns: tuple[int, int], decimals: int) -> flo
     return sign * int(figures or 0) * 1e6 / float(10**places)
 
 
-def _header(record: Record) -> Header:
-    flags = [_integer(record, column, column) != 0 for column in range(1, 6)]
-    header = Header(
-        left_handed=flags[0],
-        sorted_input=flags[1],
-        other_least_count=flags[2],
-        skip_card=flags[3],
-        plot_each_case=flags[4],
-        comparator=_integer(record, 6, 7),
-        secondary=record.columns(8, 8) == "R",
-        operators=tuple(_integer(record, 10 + 3 * case, 12 + 3 * case) for case in range(CASES)),
-        date=record.columns(72, 79).strip(" "),
-        master=_integer(record, 80, 80),
-    )
-    if header.comparator > MAX_COMPARATOR:
-        raise _refusal(record, 6, 7, phrase("error.most", high=MAX_COMPARATOR, value=header.comparator))
-    if header.master > SPECIAL_GRID:
-        raise _refusal(record, 80, 80, phrase("error.most", high=SPECIAL_GRID, value=header.master))
-    return header
-
-
-def _format(header: Header) -> _Format:
-    """Return the data card format (comparator numbers: report, section II)."""
-    if header.secondary:
-        return SECONDARY
-    if header.comparator == 11 and header.other_least_count:
-        return LEAST_COUNT
-    return {12: PSK_LEFT, 13: PSK_RIGHT}.get(header.comparator, STANDARD)
-
-
 def join_least_count(coarse: int, unit: int) -> int:
     """Join a coarse reading and its separate unit digit (subroutine MICRON)."""
     tens, digit = divmod(coarse, 10)
@@ -149,17 +106,34 @@ def check_number(place: Failing, what: str, number: int, low: int, high: int) ->
 
 
 class _Deck:
-    def __init__(self, cards: Iterator[Record], header: Header, first: Record, grids: Iterable[Grid]) -> None:
-        self.header = header
-        self.first = first
-        self.cards = cards
-        self.messages: list[Message] = []
+    """A header card, FORMAT (5I1,I2,A1,1X,20I3,2X,A8,I1), and the cards after it."""
+
+    def __init__(self, cards: Iterator[Record], first: Record) -> None:
+        flags = [_integer(first, column, column) != 0 for column in range(1, 6)]
+        self.cards, self.first, self.skips_card = cards, first, flags[3]
+        self.header = Session(
+            cases=(),
+            grids={},
+            comparator=_integer(first, 6, 7),  # 0 ends the job
+            secondary=first.columns(8, 8) == "R",  # The right stage of a stereocomparator
+            date=first.columns(72, 79).strip(" "),
+            left_handed=flags[0],
+            sorted_input=flags[1],
+            least_count_one_micrometre=not flags[2],  # Comparator 11 may have separate unit digits
+            plot_each_case=flags[4],  # As in the text (the listing reverses it)
+            source=first.source.path,
+        )
+        # Operator of each case, 0 if none
+        self.operators = [_integer(first, 10 + 3 * case, 12 + 3 * case) for case in range(CASES)]
+        self.master = _integer(first, 80, 80)  # 0 grid 773, 1 grid 1320, 2 grid 778, 3 special grid follows
+        for columns, value, high in (
+            ((6, 7), self.header.comparator, MAX_COMPARATOR),
+            ((80, 80), self.master, SPECIAL_GRID),
+        ):
+            if value > high:
+                raise _refusal(first, *columns, phrase("error.most", high=high, value=value))
         self.centre_um: float | None = None
-        special = self._special_grid() if header.master == SPECIAL_GRID else None
-        master = special or built_in_grid(BUILT_IN[min(header.master, 2)])
-        self.grids = {grid.number: grid for grid in [*grids] or [master]}
-        if special is not None:
-            self.messages.append(first.message(phrase("comparators.special-grid", plate=special.number)))
+        self.grids: dict[int, Grid] = {}
 
     def _special_grid(self) -> Grid:
         points, xy = [], []
@@ -167,37 +141,34 @@ class _Deck:
             points.append(_integer(card, *STANDARD.point))
             xy.append([_micrometres(card, columns, 8) for columns in (STANDARD.x, STANDARD.y)])
             if not card.blank(80, 80):
-                number = 1000 * self.header.operators[18] + self.header.operators[19]
+                number = 1000 * self.operators[18] + self.operators[19]
                 return Grid(number, np.array(points), np.array(xy))
         raise self.first.error(phrase("comparators.grid-end"))
 
-    def session(self) -> Session:
-        if self.header.skip_card:
+    def session(self, grids: Iterable[Grid]) -> Session:
+        messages, readings, number = list[Message](), list[Reading](), self.header.comparator
+        if self.master == SPECIAL_GRID:
+            master = self._special_grid()
+            messages.append(self.first.message(phrase("comparators.special-grid", plate=master.number)))
+        else:
+            master = built_in_grid(BUILT_IN[self.master])
+        self.grids = {grid.number: grid for grid in [*grids] or [master]}
+        if self.skips_card:
             next(self.cards, None)
-        layout = _format(self.header)
-        readings: list[Reading] = []
+        layout = {12: PSK_LEFT, 13: PSK_RIGHT}.get(number, STANDARD)
+        if number == 11 and not self.header.least_count_one_micrometre:
+            layout = LEAST_COUNT
+        layout = SECONDARY if self.header.secondary else layout
         for card in self.cards:
             if card.blank(1, 80):
                 break
             reading = self._reading(card, layout)
             if reading.xy_um == (0.0, 0.0):
-                self.messages.append(card.message(phrase("comparators.zero-readings", point=reading.point)))
+                messages.append(card.message(phrase("comparators.zero-readings", point=reading.point)))
             else:
                 readings.append(reading)
-        session = Session(
-            cases=collect_cases(readings),
-            grids=self.grids,
-            comparator=self.header.comparator,
-            secondary=self.header.secondary,
-            date=self.header.date,
-            left_handed=self.header.left_handed,
-            sorted_input=self.header.sorted_input,
-            least_count_one_micrometre=not self.header.other_least_count,
-            plot_each_case=self.header.plot_each_case,
-            range_centre_um=self.centre_um,
-            source=self.first.source.path,
-            messages=self.messages,
-        )
+        more = {"range_centre_um": self.centre_um, "messages": messages}
+        session = replace(self.header, cases=collect_cases(readings), grids=self.grids, **more)
         if not session.cases:
             raise self.first.error(phrase("comparators.empty-deck"))
         session.check()
@@ -218,7 +189,7 @@ class _Deck:
         return Reading(
             plate=self._plate(card, plate),
             case=case,
-            operator=self.header.operators[case - 1],
+            operator=self.operators[case - 1],
             leg=leg,
             point=_integer(card, *layout.point),
             xy_um=(xy[0], xy[1]),
@@ -253,15 +224,15 @@ def read_cards(path: Path, grids: Iterable[Grid] = (), *, left_handed: bool | No
     InputError
         If the file or a card cannot be read. The message names the record.
     """
-    path = path_of("path", path)
+    path, plates = path_of("path", path), list(grids)
     source = Source.read(path)
     cards = (source.record(number) for number in range(1, len(source.lines) + 1))
     sessions = []
     for first in cards:
-        header = _header(first)
-        if header.comparator == 0:
+        deck = _Deck(cards, first)
+        if deck.header.comparator == 0:
             break
-        session = _Deck(cards, header, first, list(grids)).session()
+        session = deck.session(plates)
         sessions.append(session if left_handed is None else replace(session, left_handed=left_handed))
     if not sessions:
         raise InputError(phrase("comparators.no-deck"), file=path)

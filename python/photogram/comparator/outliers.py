@@ -64,14 +64,11 @@ class Outlier:
 
     @property
     def distance_um(self) -> float:
-        """Distance of measured and expected position."""
         return math.hypot(*self.off_um)
 
 
 @dataclass(frozen=True)
 class Screening:
-    """Result of the search for outliers of the adjustment."""
-
     outliers: tuple[Outlier, ...]  # By case, then by point
     limit: float  # Critical value of the ratios of all coordinates at the level of 5 percent
     # Effect of the outliers on corrected coordinates: root mean square over the measured points, without
@@ -90,8 +87,6 @@ class Screening:
 
 @dataclass(frozen=True, eq=False)
 class PointingTests:
-    """Tests of the pointings of a case against the others."""
-
     case: Case  # The case
     deviations: Floats  # (k, 2) from the mean of the point or leg
     ratios: Floats  # (k, 2) externally studentized; 0 for single pointings
@@ -99,7 +94,6 @@ class PointingTests:
 
 
 def pointing_tests(cases: Sequence[Case]) -> list[PointingTests]:
-    """Test pointings against the others of their case."""
     tests = []
     for case in cases:
         _, group, counts = np.unique(

@@ -96,7 +96,6 @@ def vector_plot(fields: Sequence[VectorField], side: float, title: str) -> Plot:
 
 
 def residual_vectors(calibration: Calibration, *, in_grid: bool) -> Plot:
-    """Draw the final residuals of each case in the system of the comparator or of the plate."""
     fields = []
     for case, fit in zip(calibration.cases, calibration.last_fits, strict=True):
         title = f"case {case.number}, point {case.placed.orientation.nearest_point} nearest zero"
@@ -112,7 +111,6 @@ def residual_vectors(calibration: Calibration, *, in_grid: bool) -> Plot:
 
 
 def average_vectors(calibration: Calibration, plate: int) -> Plot:
-    """Draw average residuals by comparator location and by grid point, on one scale."""
     averages = calibration.plates[plate].averages
     grid = calibration.session.grids[plate]
     title, places = "by grid point: correction of the grid", grid.xy_um[grid.rows_of(averages.points)] / MM
@@ -124,7 +122,6 @@ def average_vectors(calibration: Calibration, plate: int) -> Plot:
 
 
 def joint_grid(calibration: Calibration, plate: int) -> Plot:
-    """Draw the grid corrections of the joint adjustment with standard ellipses."""
     joint = calibration.joint
     if joint is None:
         raise InputError(phrase("comparators.no-joint"))
@@ -173,7 +170,6 @@ MAGNIFICATION = 10_000  # of the net: a micrometre is drawn as 10 mm
 
 
 def correction_surface(calibration: Calibration, polynomial: Polynomial, whose: str = "") -> Plot:
-    """Draw contour maps of the corrections in x and y with the measured points."""
     centre, half = np.array(polynomial.frame.centre_um), np.array(polynomial.frame.half_range_um)
     x, y = np.linspace(centre - half, centre + half, FINE).T
     places = np.stack(np.meshgrid(x, y), axis=-1)
@@ -226,7 +222,6 @@ STANDARD_PERCENT = 39  # Confidence of the standard ellipse, which the program d
 
 
 def pointing_ellipses(calibration: Calibration) -> Plot:
-    """Draw the 39 percent ellipses of pointings at the measured points of each case."""
     places = [case.placed.means_um / MM for case in calibration.cases]
     axes = [_axes([own.precision for own in case.placed.readings]) for case in calibration.cases]
     largest = max(float(semi_axes.max()) for semi_axes, _ in axes)
@@ -273,7 +268,6 @@ def grid_ellipses(calibration: Calibration, operator: int | None = None) -> Plot
 
 
 def pooled_ellipses(calibration: Calibration) -> Plot:
-    """Draw the pooled ellipses of cases, operators and all pointings at all levels."""
     pointing = calibration.pointing
     pooled = {
         **{f"case {case.number}": case.placed.precision for case in calibration.cases},
@@ -318,7 +312,6 @@ def _ellipses(places: Floats, semi_axes: Floats, turns: Floats, scales: Mapping[
 
 
 def residual_histogram(calibration: Calibration) -> Plot:
-    """Draw histograms of the final residuals with normal curves."""
     residuals = np.vstack([fit.residuals.comparator_um for fit in calibration.last_fits])
     limit = float(np.abs(residuals).max()) * 1.1 or 1.0
     bins = 2 * round(math.sqrt(len(residuals)) * 0.75) + 1  # Odd
@@ -345,7 +338,6 @@ def residual_histogram(calibration: Calibration) -> Plot:
 
 
 def variance_bars(calibration: Calibration) -> Plot:
-    """Draw the components of the error as bars of variance."""
     components = calibration.variance.components_um
     total = components["total"] ** 2
     names = [name for name in components if name != "total"][::-1]

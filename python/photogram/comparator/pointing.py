@@ -141,7 +141,6 @@ class PointReadings:
 
     @property
     def identical(self) -> bool:
-        """Whether several readings are equal in both coordinates."""
         return self.count > 1 and self.squares_um2 == (0.0, 0.0)
 
     @property

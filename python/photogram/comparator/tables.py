@@ -31,7 +31,6 @@ LINEAR_AXES = (
 
 
 def variance(calibration: Calibration) -> Table:
-    """Return the analysis of variance: standard deviations of each axis and both."""
     own, plates = calibration.variance, calibration.plates
     stages = {
         "Before the calibration, everything": own.before,
@@ -83,7 +82,6 @@ def linear(
 
 
 def terms(test: PolynomialTest) -> Table:
-    """Return the terms of the polynomials with their tests."""
     found, (first, second) = test.terms, test.degrees_of_freedom
     columns = [
         of_each(found, "axis", kind="name", head="Axis"),
@@ -132,7 +130,6 @@ def _powers(names: Sequence[str]) -> Quantity:
 
 
 def cases(calibration: Calibration) -> Table:
-    """Return the cases with separate and combined adjustments."""
     found, last, combined = calibration.cases, calibration.last_fits, calibration.linear.cases
     heads = {"free": "Unit weight, free", "linear": "after linear", "nonlinear": "after polynomials"}
     stages, alone, together = [], [], []
@@ -211,7 +208,6 @@ def _closeouts(case: CaseResult) -> list[dict[str, object]]:
 
 
 def outliers(screening: Screening) -> Table:
-    """Return measured points inconsistent with the adjustment of the others."""
     found = screening.outliers
     instead = ["none" if each.instead is None else str(each.instead) for each in found]
     columns = [
@@ -227,7 +223,6 @@ def outliers(screening: Screening) -> Table:
 
 
 def far_pointings(found: Sequence[FarPointing]) -> Table:
-    """Return single pointings inconsistent with the others of their case."""
     columns = [
         of_each(found, "case", kind="name", head="Case"),
         of_each(found, "point", kind="name", head="Point"),

@@ -148,7 +148,6 @@ class AxisSigma:
 
     @property
     def total(self) -> float:
-        """Root mean square of both axes."""
         return math.sqrt((self.x**2 + self.y**2) / 2)
 
     def truncated(self) -> AxisSigma:
@@ -253,7 +252,6 @@ class TermTest:
 
     @property
     def ratio(self) -> float:
-        """Coefficient over standard deviation (t)."""
         return self.coefficient_um / self.sd_um if self.sd_um > 0 else math.nan
 
 
@@ -284,7 +282,6 @@ NODES = 200
 
 
 def polynomial_tests(linear: CombinedLinear, nonlinear: CombinedPolynomial) -> PolynomialTest:
-    """Test the polynomials of the combined adjustment."""
     polynomial = nonlinear.polynomial
     dof = linear.degrees_of_freedom - 2 * OWN_TERMS
     before, after = (

@@ -45,15 +45,6 @@ _NAMES = {int: "whole number", float: "number"}
 _FIRST = 0x2500  # A ruler: its characters do not occur on cards and count the columns
 
 
-@dataclass(frozen=True)
-class _Field:
-    """Columns of a field, from 0 with the last excluded, and its type."""
-
-    first: int
-    last: int
-    kind: type[int] | type[float]
-
-
 class CardFormat:
     """The FORMAT of a card with integers, followed by real numbers."""
 
@@ -76,11 +67,10 @@ class CardFormat:
         columns = [(ord(field[0]) - _FIRST, ord(field[-1]) - _FIRST + 1) for field in fields[: len(wanted)]]
         if max(last for _, last in columns) > COLUMNS:
             raise ValueError(phrase("format.columns", format=self.text, columns=COLUMNS))
-        self._fields = [_Field(*place, kind) for place, kind in zip(columns, wanted, strict=True)]
+        self._fields = [*zip(columns, wanted, strict=True)]
 
     @classmethod
     def of(cls, record: Record, *, reals: int) -> CardFormat:
-        """Return the FORMAT on a card."""
         try:
             return cls(record.text, reals=reals)
         except ValueError as error:
@@ -89,25 +79,24 @@ class CardFormat:
     def read(self, record: Record) -> list[float]:
         """Return the numbers of a card; integers are of type int."""
         card = record.text.ljust(COLUMNS)
-        for each in self._fields:
-            card = card[: each.first] + self._filled(each, record, card) + card[each.last :]
+        for (first, last), kind in self._fields:
+            card = card[:first] + self._filled(first, last, kind, record, card) + card[last:]
         values: list[float] = self._reader.read(card)
         return values[: len(self._fields)]
 
-    def _filled(self, field: _Field, record: Record, card: str) -> str:
+    def _filled(self, first: int, last: int, kind: type, record: Record, card: str) -> str:
         """Return the characters of a field, with FORTRAN IV blanks replaced by zeros."""
-        raw = card[field.first : field.last].upper()
+        raw = card[first:last].upper()
         digits = raw.lstrip(" ").replace(" ", "0")
-        columns = {"first": field.first + 1, "last": field.last}
-        if digits and _NUMBERS[field.kind].fullmatch(digits) is None:
-            kind = _NAMES[field.kind]
+        columns = {"first": first + 1, "last": last}
+        if digits and _NUMBERS[kind].fullmatch(digits) is None:
             raise record.error(
-                phrase("deck.number", **columns, kind=kind, format=self.text, value=raw.strip())
+                phrase("deck.number", **columns, kind=_NAMES[kind], format=self.text, value=raw.strip())
             )
-        counts = " " in raw.lstrip(" ") and (field.kind is int or "." not in raw or "E" in raw or "D" in raw)
+        counts = " " in raw.lstrip(" ") and (kind is int or "." not in raw or "E" in raw or "D" in raw)
         if counts:
             record.remark(phrase("deck.blanks", **columns, value=raw, number=digits))
-        return digits.rjust(field.last - field.first)
+        return digits.rjust(last - first)
 
 
 def _check_sizes(text: str) -> None:
@@ -136,21 +125,6 @@ FACTORS = CardFormat("(3D20.8)", integers=0, reals=3)
 APPROXIMATIONS = CardFormat("(6F10.0)", integers=0, reals=6)
 
 
-@dataclass(frozen=True, eq=False)
-class Job:
-    """Data shared by the sets of a job: cards 1 to 6."""
-
-    title: str  # Card 1
-    projected_format: CardFormat  # Card 3
-    sets: int  # Number of sets of readings on the same grid (ICALF)
-    coordinatograph: Coordinatograph | None  # Factors of card 5, None without
-    # Millimetres, positive (FOCAL); the limit of the iteration as published (GDIF), in the unit of the model
-    principal_distance: float
-    tolerance: float
-    numbers: list[int]  # Point numbers, and (n, 2) coordinates in millimetres, of the plate grid
-    plate_xy: Floats
-
-
 class Deck:
     """A deck that is read by set, so that errors do not affect earlier sets."""
 
@@ -168,13 +142,35 @@ class Deck:
         return self._source.messages
 
     def grids(self) -> Iterator[Grid]:
-        """Yield the sets in order."""
         while self._next <= self._end:
             self.title, self.number = self._card("the title").text.rstrip(), 0
-            job = self._job(self.title)
-            for number in range(1, job.sets + 1):
-                self.number = number
-                yield self._grid(job, number)
+            plate_format = CardFormat.of(self._card("the FORMAT of the plate grid"), reals=2)
+            projected_format = CardFormat.of(self._card("the FORMAT of the readings"), reals=3)
+            card = self._card("the card of specifications")
+            points, sets, correct, principal_distance, tolerance = SPECIFICATIONS.read(card)
+            if points < 1:
+                raise card.error(phrase("deck.points", value=points))
+            if not principal_distance > 0:
+                raise card.error(phrase("projector.principal-distance", value=principal_distance))
+            factors = None
+            if correct == 1:
+                factors = Coordinatograph(*FACTORS.read(self._card("the card of coordinatograph factors")))
+            plate = self._plate(plate_format, int(points))
+            for self.number in range(1, max(1, int(sets)) + 1):
+                card = self._card("the card of initial approximations")
+                omega, phi, kappa, *position = APPROXIMATIONS.read(card)
+                angles = np.array([omega, phi, kappa]) / MINUTES_PER_RADIAN
+                yield reduce(
+                    self._readings(projected_format, [*plate]),
+                    ids=[*plate],
+                    plate_xy=np.array([*plate.values()]),
+                    principal_distance=principal_distance,
+                    tolerance=tolerance,
+                    coordinatograph=factors,
+                    initial=np.array([*position, *angles]),
+                    title=self.title,
+                    number=self.number,
+                )
 
     def _card(self, what: str) -> Record:
         if self._next > len(self._source.lines):
@@ -182,83 +178,45 @@ class Deck:
         self._next += 1
         return self._source.record(self._next - 1)
 
-    def _job(self, title: str) -> Job:
-        plate_format = CardFormat.of(self._card("the FORMAT of the plate grid"), reals=2)
-        projected_format = CardFormat.of(self._card("the FORMAT of the readings"), reals=3)
-        card = self._card("the card of specifications")
-        points, sets, correct, principal_distance, tolerance = SPECIFICATIONS.read(card)
-        if points < 1:
-            raise card.error(phrase("deck.points", value=points))
-        if not principal_distance > 0:
-            raise card.error(phrase("projector.principal-distance", value=principal_distance))
-        factors = None
-        if correct == 1:
-            factors = Coordinatograph(*FACTORS.read(self._card("the card of coordinatograph factors")))
-        rows = self._plate(plate_format, int(points))
-        return Job(
-            title=title,
-            projected_format=projected_format,
-            sets=max(1, int(sets)),
-            coordinatograph=factors,
-            principal_distance=principal_distance,
-            tolerance=tolerance,
-            numbers=[int(row[0]) for row in rows],
-            plate_xy=np.array([row[1:] for row in rows]),
-        )
-
-    def _plate(self, plate_format: CardFormat, points: int) -> list[list[float]]:
-        rows: dict[float, list[float]] = {}
+    def _plate(self, plate_format: CardFormat, points: int) -> dict[int, list[float]]:
+        """Return coordinates (mm) of the plate grid by point number."""
+        plate: dict[int, list[float]] = {}
         for _ in range(points):
             card = self._card("a card of the plate grid")
-            row = plate_format.read(card)
-            if row[0] == 0:
+            number, *xy = plate_format.read(card)
+            if number == 0:
                 raise card.error(phrase("deck.zero"))
-            if row[0] in rows:
-                raise card.error(phrase("deck.point-repeated", point=row[0]))
-            rows[row[0]] = row
-        return list(rows.values())
+            if number in plate:
+                raise card.error(phrase("deck.point-repeated", point=number))
+            plate[int(number)] = xy
+        return plate
 
-    def _grid(self, job: Job, number: int) -> Grid:
-        omega, phi, kappa, *position = APPROXIMATIONS.read(self._card("the card of initial approximations"))
-        angles = np.array([omega, phi, kappa]) / MINUTES_PER_RADIAN
-        readings = self._readings(job)
-        return reduce(
-            readings,
-            ids=job.numbers,
-            plate_xy=job.plate_xy,
-            principal_distance=job.principal_distance,
-            tolerance=job.tolerance,
-            coordinatograph=job.coordinatograph,
-            initial=np.array([*position, *angles]),
-            title=job.title,
-            number=number,
-        )
-
-    def _readings(self, job: Job) -> list[Floats]:
+    def _readings(self, projected_format: CardFormat, numbers: list[int]) -> list[Floats]:
         """Read all readings, (k, 3) for each point, and the flag card (5.1)."""
+
+        def read() -> tuple[Record, float, list[float]]:
+            card = self._card("a card of readings")
+            number, *xyz = projected_format.read(card)
+            return card, number, xyz
+
         readings: list[Floats] = []
-        card, point, xyz = self._reading(job)
-        for expected in job.numbers:
+        card, point, xyz = read()
+        for expected in numbers:
             if point != expected:
                 raise card.error(phrase("deck.order", point=expected))
             rows = []
             while point == expected:
                 rows.append(xyz)
                 if self._next > len(self._source.lines):
-                    if expected != job.numbers[-1]:
+                    if expected != numbers[-1]:
                         raise self._source.error(phrase("deck.end-after-point", point=expected))
                     card.remark(phrase("deck.no-flag"))
                     return [*readings, np.array(rows)]
-                card, point, xyz = self._reading(job)
+                card, point, xyz = read()
             readings.append(np.array(rows))
         if point != 0:
-            raise card.error(phrase("deck.flag", point=job.numbers[-1], value=point))
+            raise card.error(phrase("deck.flag", point=numbers[-1], value=point))
         return readings
-
-    def _reading(self, job: Job) -> tuple[Record, int, list[float]]:
-        card = self._card("a card of readings")
-        number, *xyz = job.projected_format.read(card)
-        return card, int(number), xyz
 
 
 def read_deck(path: Path) -> list[Grid]:

@@ -31,7 +31,6 @@ ERRORS = ("X", "Y", "Z", "omega_minutes", "phi_minutes", "kappa_minutes")
 def run_document(
     results: Sequence[PerspectiveCenter], messages: Sequence[Message], stop: Judgement | None
 ) -> Document:
-    """Return the document of the sets of a run, with warnings and stop reason."""
     sets = [set_document(result) for result in results]
     title = sets[0].what if sets else ""
     run = layered("Perspective centre of a projector", title, sets)
@@ -51,7 +50,6 @@ def run_document(
 
 
 def set_document(result: PerspectiveCenter) -> Document:
-    """Return the document of a set."""
     grid, plate, largest = result.grid, result.sigma0_plate, max(result.radial_distortion, key=abs)
     outliers = [(grid.ids[row], "XY"[axis]) for row, axis in result.outliers]
     errors = np.full(6 + len(result.unknown), np.nan)

@@ -92,16 +92,14 @@ def calibrate(
     elif options.refraction:
         remarks = [phrase("stars.no-refraction-solution")]
 
-    def solve(left: Problem) -> Solved:
-        found = run(left, initial, free_parameters(left), solution="maximum", limit=limit)
-        return _refraction(left, run, found) if options.refraction and found.converged else found
-
     def solution(left: Problem) -> Result:
-        found = solve(left)
+        found = run(left, initial, free_parameters(left), solution="maximum", limit=limit)
+        if options.refraction and found.converged:
+            found = _refraction(left, run, found)
         return Result(left, found, (), left, (found,))
 
     if not solved.converged:
-        remarks += culprits(problem, solved, solve)
+        remarks += culprits(problem, solved, solution)
     result = Result(problem, solved, (), problem, stages)
     if result.converged:
         result = replace(result, spoiled=harm(result, solution) or "")
@@ -272,27 +270,22 @@ def harm(result: Result, iterate: Callable[[Problem], Result]) -> Phrase | None:
     return phrase("stars.harm", name=NAMES[camera[int(change.argmax())]], change=float(change.max()))
 
 
-def culprits(problem: Problem, solved: Solved, iterate: Callable[[Problem], Solved]) -> list[Phrase]:
+def culprits(problem: Problem, solved: Solved, iterate: Callable[[Problem], Result]) -> list[Phrase]:
     """Return a warning on the star whose removal makes the solution converge."""
-    before = sum(solved.sums)
-    best, culprit = math.inf, ""
-    for star in _suspects(problem, solved):
-        others = np.arange(len(problem.star_ids)) == star
-        try:
-            again = iterate(problem.without(others, np.zeros(len(problem.image_points), bool)))
-        except AdjustmentError:
-            continue
-        total = sum(again.sums)
-        if again.converged and _FALL * total < before and total < best:
-            best, culprit = total, problem.star_ids[star]
-    return [phrase("stars.culprit", star=culprit)] if culprit else []
-
-
-def _suspects(problem: Problem, solved: Solved) -> list[int]:
     size = np.zeros(len(problem.star_ids))
     weighted = np.einsum("mi,mij,mj->m", solved.residuals, problem.image_weights, solved.residuals)
     np.maximum.at(size, problem.image_stars, np.nan_to_num(weighted))
     observed = problem.known & ~problem.held
     off = (solved.places - problem.star_places)[observed]
     size[observed] += np.nan_to_num(np.einsum("si,sij,sj->s", off, problem.star_weights[observed], off))
-    return [int(star) for star in np.argsort(-size, kind="stable")[:_MAX_SUSPECTS]]
+    best, culprit = math.inf, ""
+    for star in np.argsort(-size, kind="stable")[:_MAX_SUSPECTS].tolist():
+        others = np.arange(len(problem.star_ids)) == star
+        try:
+            again = iterate(problem.without(others, np.zeros(len(problem.image_points), bool)))
+        except AdjustmentError:
+            continue
+        total = sum(again.solved.sums)
+        if again.converged and _FALL * total < sum(solved.sums) and total < best:
+            best, culprit = total, problem.star_ids[star]
+    return [phrase("stars.culprit", star=culprit)] if culprit else []

@@ -30,7 +30,6 @@ DEGREES, GRADS = ("rad", "deg", math.degrees(1)), ("rad", "grads", 1 / GRAD)
 
 
 def names_column(values: Iterable[object], head: str, member: str = "") -> Quantity:
-    """Return a column of names or texts."""
     return Quantity(np.fromiter(values, object), (), "name", member or None, member, head=head)
 
 
@@ -67,7 +66,6 @@ def correlated(names: Sequence[str], covariance: Floats) -> list[tuple[str, str,
 
 
 def correlation_remarks(pairs: Sequence[tuple[str, str, float]]) -> Iterator[Phrase]:
-    """Yield a warning for each pair of correlated parameters."""
     for first, second, correlation in pairs:
         yield phrase("stars.correlation", first=first, second=second, correlation=correlation)
 
@@ -80,7 +78,6 @@ def significance(names: Sequence[str], values: Floats, covariance: Floats) -> di
 
 
 def correlated_members(pairs: Sequence[tuple[str, str, float]]) -> list[dict[str, object]]:
-    """Return correlated pairs for JSON documents."""
     return [{"parameters": [a, b], "correlation": correlation} for a, b, correlation in pairs]
 
 
@@ -131,7 +128,6 @@ def parameter_table(
 
 
 def matrix_table(key: str, title: str, names: Sequence[str], matrix: Floats, **form: Any) -> Table:
-    """Return a matrix of parameters with named rows and columns."""
     return Table(
         key,
         title,

@@ -50,7 +50,6 @@ class Directions:
 
 
 def directions(result: Result) -> Directions:
-    """Return the unknown directions of a plate with their error ellipses."""
     problem, solved, unit = result.problem, result.solved, result.mean_error
     stars = np.flatnonzero(~problem.known)
     seen, first = np.unique(problem.image_stars, return_index=True)
@@ -166,8 +165,6 @@ def refraction_curves(result: Result, group: str) -> RefractionCurves:
 
 @dataclass(frozen=True, eq=False)
 class Histogram:
-    """Histogram with the normal curve."""
-
     # (k + 1,) limits of equal classes from 3.25 standard deviations below the mean to 3.25 above
     edges: Floats
     counts: Indices  # (k,) residuals in each class, and expected numbers of the normal distribution
@@ -228,7 +225,6 @@ class ComparatorFrame:
 
     @property
     def mean_errors(self) -> tuple[float, float, float]:
-        """Mean errors of the scales and of epsilon."""
         x, y, epsilon = np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).tolist()
         return x, y, epsilon
 

@@ -24,7 +24,6 @@ class Card(Record):
     """Card with fields given by first and last column, counted from 1."""
 
     def name(self, first: int, last: int) -> str:
-        """Return a field as text."""
         return self.columns(first, last).strip()
 
     def real(self, first: int, last: int, decimals: int = 8) -> float:
@@ -45,7 +44,6 @@ class Card(Record):
         return self.error(phrase("error.columns", first=first, last=last, message=message_of(error)))
 
     def reals(self, first: int, width: int, count: int, decimals: int = 8) -> list[float]:
-        """Return consecutive fields of equal width."""
         starts = range(first, first + width * count, width)
         return [self.real(start, start + width - 1, decimals) for start in starts]
 
@@ -63,8 +61,6 @@ class Card(Record):
 
 
 class Cards:
-    """Cards of a file in sequence, one per line."""
-
     def __init__(self, file: Path) -> None:
         self._source, self._taken = Source.read(file), 0
 

@@ -43,7 +43,6 @@ if TYPE_CHECKING:
 
 
 def plate_document(result: Result) -> Document:
-    """Return the document of a plate."""
     problem = result.problem
     size = [Facts("Size", _much(result)), Facts("Fit", _good(result))]
     of_solution = _solution_sections(result)

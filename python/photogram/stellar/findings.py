@@ -61,7 +61,6 @@ def plate_tests(result: Result) -> list[Tested]:
 
 
 def plate_findings(result: Result) -> Findings:
-    """Return the findings on a plate."""
     given = bool(result.problem.options.mean_error)
     weak = [name for name, ratio in result.significance().items() if ratio < SIGNIFICANT]
     return Findings(
@@ -103,7 +102,6 @@ def night_tests(result: CalibratedNight) -> list[Tested]:
 
 
 def night_findings(result: CalibratedNight) -> Findings:
-    """Return the findings on exposures of the sky."""
     doubtful = [
         Phrase("part.exposure", {"name": str(name), "odds": float(odds)})
         for name, odds in result.doubtful.items()

@@ -138,22 +138,21 @@ def iterate(
 
     AdjustmentError: if stars or parameters are not determined, or the initial values give no image.
     """
-    parameters, places = initial.copy(), problem.places_at(initial, free)
+    found: dict[str, Any] = {"parameters": initial.copy(), "places": problem.places_at(initial, free)}
     dof = degrees_of_freedom(problem, free).usable
-    unit = _EXPECTED * parameters[12] * float(np.sqrt(np.median(problem.image_weights[:, 0, 0])))
+    unit = _EXPECTED * initial[12] * float(np.sqrt(np.median(problem.image_weights[:, 0, 0])))
     run = _Run(problem, limit or _MAX_ITERATIONS, dof, threads or 0, progress)
     for _ in range(3):
-        active = run.effective(parameters, places, free)
-        found = run.settle(parameters, places, active, unit, _ROUGH)
-        parameters, places = found["parameters"], found["places"]
+        active = run.effective(found, free)
+        found = run.settle(found, active, unit, _ROUGH)
         if (active == free).all() or found["status"] not in ("converged", "still"):
             break
     mean_error = float(np.sqrt(sum(found["sums_of_squares"]) / dof))
-    rounding = _rounding(problem, parameters)
+    rounding = _rounding(problem, found["parameters"])
     unit = max(mean_error, rounding / _FINE)
     run.rounding = rounding / unit
-    status = run.settle(parameters, places, free, unit, max(rounding / unit, _FINEST))
-    last = run.adjust(status["parameters"], status["places"], free, unit, 0.0, most=_MORE, covariance=True)
+    settled = run.settle(found, free, unit, max(rounding / unit, _FINEST))
+    status, last = settled["status"], run.adjust(settled, free, unit, 0.0, _MORE, covariance=True)
     return Solved.of(
         problem,
         last,
@@ -162,8 +161,8 @@ def iterate(
         free=free,
         cofactors=last.get("cofactors", np.full((len(free), len(free)), np.nan)),
         log_determinant=last.get("log_determinant", math.nan),
-        stop=_STOPS.get(status["status"], f"{len(run.levels) - 1} ITERATIONS COMPLETED"),
-        converged=status["status"] in ("converged", "still"),
+        stop=_STOPS.get(status, f"{len(run.levels) - 1} ITERATIONS COMPLETED"),
+        converged=status in ("converged", "still"),
         levels=tuple(run.levels),
         solution=solution,
     )
@@ -188,17 +187,15 @@ class _Run:
     levels: list[float] = field(default_factory=list)
     rounding: float = 0.0
 
-    def settle(
-        self, parameters: Floats, places: Floats, free: Bools, unit: float, fraction: float
-    ) -> dict[str, Any]:
+    def settle(self, at: dict[str, Any], free: Bools, unit: float, fraction: float) -> dict[str, Any]:
         """Adjust to small corrections, a constant sum of squares, or the iteration limit."""
-        found = self.adjust(parameters, places, free, unit, fraction, most=_FIRST)
+        found = self.adjust(at, free, unit, fraction, _FIRST)
         while found["status"] != "converged":
             if self._still():
                 return {**found, "status": "still"}
             if found["status"] == "diverged" or len(self.levels) > self.limit:
                 break
-            found = self.adjust(found["parameters"], found["places"], free, unit, fraction, most=_NEXT)
+            found = self.adjust(found, free, unit, fraction, _NEXT)
         return found
 
     def _still(self) -> bool:
@@ -208,27 +205,25 @@ class _Run:
         sums = self.dof * (last / last[-1]) ** 2
         return bool(np.ptp(sums) <= max(_STILL, self.dof * self.rounding))
 
-    def effective(self, parameters: Floats, places: Floats, free: Bools) -> Bools:
+    def effective(self, at: dict[str, Any], free: Bools) -> Bools:
         """Return the free parameters with an effect or a weight at some values."""
         active = free.copy()
         try:
-            active[self.problem.core(parameters, places, ~free).without_effect()] = False
+            active[self.problem.core(at["parameters"], at["places"], ~free).without_effect()] = False
         except _photocore.StellarError as error:
             raise failure(self.problem, error) from None
         return active
 
     def adjust(
         self,
-        parameters: Floats,
-        places: Floats,
+        at: dict[str, Any],
         free: Bools,
         unit: float,
         fraction: float,
-        *,
         most: int,
         covariance: bool = False,
     ) -> dict[str, Any]:
-        core = self.problem.core(parameters, places, ~free)
+        core = self.problem.core(at["parameters"], at["places"], ~free)
         try:
             found = core.adjust(
                 unit=unit,

@@ -31,8 +31,6 @@ DECISIVE, POSITIVE = 10.0, 2.0  # Differences of BIC
 
 @dataclass(frozen=True)
 class LensTest:
-    """Significance test of lens parameters."""
-
     name: str  # Hypothesis of zero: `fx - fy`, `k3`, `p1, p2`
     statistic: float  # F with `dimension` and `freedom` degrees of freedom
     dimension: int  # Degrees of freedom of the statistic
@@ -44,7 +42,6 @@ class LensTest:
 
     @property
     def significant(self) -> bool:
-        """Whether the parameters differ significantly from zero."""
         return self.probability < self.level
 
     @property
@@ -54,7 +51,6 @@ class LensTest:
 
     @property
     def verdict(self) -> str:
-        """The outcome in words."""
         if self.needed:
             return "needed"
         return "not zero, but too small to matter" if self.significant else "not shown by the data"

@@ -44,7 +44,6 @@ class Match:
 
     @property
     def accepted(self) -> bool:
-        """Return whether the match is significant against chance."""
         return self.expected < ACCEPTED
 
     @property
@@ -53,7 +52,6 @@ class Match:
         return not self.accepted and self.expected <= DOUBTFUL
 
     def reason(self) -> Phrase:
-        """Return why an exposure is rejected."""
         if self.crowded:
             return phrase("stars.crowded")
         if len(self.found) < FEWEST:
@@ -68,8 +66,6 @@ class Match:
 
 @dataclass(frozen=True, eq=False)
 class Search:
-    """Search region of star images."""
-
     frame: tuple[float, float]  # Width and height
     radius: float  # of an image from its prediction; for unknown roll, of distances from the axis
     stretch: float = STRETCH  # Largest relative scale error
@@ -101,7 +97,6 @@ class Search:
         return chosen, max(int(middle.sum()) / area, len(chosen) / around)
 
     def candidates(self, measured: Floats, predicted: Floats) -> Bools:
-        """Return (m, n) whether image and star are possible pairs."""
         if self.axis is None:
             return np.asarray(
                 np.linalg.norm(measured[:, None] - predicted[None], axis=2) <= self.radius, bool

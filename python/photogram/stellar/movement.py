@@ -177,7 +177,6 @@ def _modified(result: Result, c: Floats) -> Solved:
 
 
 def _iterated(result: Result, spread: Floats, threads: int | None) -> Solved:
-    """Adjust again with common attitudes."""
     solved, problem = result.solved, result.problem
     groups = spread[:9:3, :9:3].argmax(axis=1)
     weights, initial = _common_weights(problem, spread, solved.parameters)

@@ -38,7 +38,6 @@ MAX_EXPOSURES = 200
 
 
 def night_document(result: CalibratedNight) -> Document:
-    """Return the document of a night."""
     much, good = facts(result)
     camera = result.camera
     free = np.flatnonzero(camera.known)
@@ -141,7 +140,6 @@ _DEGREES = ("deg", "deg", 1.0)
 
 
 def parameters(result: CalibratedNight) -> Table:
-    """Return the camera parameters with their priors."""
     camera, prior = result.camera, result.night.prior
     before = None
     if prior is not None:
@@ -265,7 +263,6 @@ def _exposure(result: CalibratedNight) -> Quantity:
 
 
 def images(result: CalibratedNight) -> Table:
-    """Return the used images: exposures, stars, pixels, residuals, tests and star probabilities."""
     found, ids = result.calibration, np.array(result.night.catalogue.ids, dtype=object)
     names, likely = np.array(result.names, dtype=object)[found.exposures], result.star_probabilities
     columns = [
@@ -292,7 +289,6 @@ def _for_people(key: str, title: str, columns: Quantities, note: str = "") -> Ta
 
 
 def stars(result: CalibratedNight) -> Table:
-    """Return the estimated stars: adjusted minus catalogue, tests."""
     found, ids = result.calibration, np.array(result.night.catalogue.ids, dtype=object)
     columns = [
         Quantity(ids[found.catalogue], kind="name", member="id", head="Star"),
@@ -305,7 +301,6 @@ def stars(result: CalibratedNight) -> Table:
 
 
 def lens_tests(result: CalibratedNight) -> Table:
-    """Return the lens tests, starting with its scale."""
     found = [*([result.scale_test] if result.scale_test else []), *result.term_tests]
     degrees = [f"{each.dimension}, {each.freedom}" for each in found]
     columns = [
@@ -322,7 +317,6 @@ def lens_tests(result: CalibratedNight) -> Table:
 
 
 def lenses(result: CalibratedNight) -> Table:
-    """Return the compared lenses, best first, with reasons of failed adjustments."""
     found = result.lenses
     best = min((each.bic for each in found), default=0.0)
     numbers = [(each.parameters, each.images, each.mean_error, each.bic - best) for each in found]
@@ -341,7 +335,6 @@ def lenses(result: CalibratedNight) -> Table:
 
 
 def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:
-    """Return facts on the numbers of observations, and on their quality."""
     found, night = result.calibration, result.night
     estimated = int(np.isfinite(found.star_residuals[:, 0]).sum())
     measured = sum(len(exposure.xy) for exposure in result.exposures)

@@ -233,11 +233,9 @@ class _Exposures:
 
     @property
     def named(self) -> Set[str]:
-        """Stars named by images."""
         return {star_key(name) for name in self.stars} - {""}
 
     def read(self, catalogue: Catalogue, site: Site, earth: Earth) -> Iterator[Exposure]:
-        """Return the exposures."""
         index = {star_key(name): i for i, name in enumerate(catalogue.ids)}
         index |= {name: i for i, name in enumerate(catalogue.ids)}
         for table, name in zip(self.tables, self.names, strict=True):

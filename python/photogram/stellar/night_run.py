@@ -74,11 +74,9 @@ class Seen:
 
     @property
     def count(self) -> int:
-        """Number of used images."""
         return int(self.kept.sum())
 
     def exposure(self, night: Night, attitude: Floats) -> Exposure:
-        """Return the exposure with the stars of its used images."""
         stars = np.where(self.kept, self.stars, -1)
         return replace(night.exposures[self.index], attitude=attitude, stars=stars)
 
@@ -141,12 +139,10 @@ class Run:
             self.first.append(seen)
 
     def exposures(self) -> list[Exposure]:
-        """Return the used exposures with their stars and adjusted attitudes."""
         pairs = zip(self.seen, self.found.attitudes, strict=True)
         return [seen.exposure(self.night, attitude) for seen, attitude in pairs]
 
     def adjust(self, night: Night) -> None:
-        """Adjust again from the adjusted values."""
         self.found = adjusted(night, self.exposures(), self.found.camera, self.threads)
 
     def settle(self) -> None:
@@ -257,7 +253,6 @@ def _counted(code: str, seen: Seen) -> Phrase:
 def adjusted(
     night: Night, exposures: Sequence[Exposure], camera: SkyCamera, threads: int | None
 ) -> SkyCalibration:
-    """Adjust exposures of a night with their stars."""
     return calibrate_exposures(
         exposures,
         camera,

@@ -128,7 +128,6 @@ def _night_distortion(result: CalibratedNight) -> list[Curves]:
 
 
 def plate_drawings(result: Result) -> Layers:
-    """Return the drawings of a plate as layers."""
     shown = [*drawings(result, PICTURES).values()]
     if result.problem.options.refraction:
         shown.append(Drawing("picture-refraction", "Refraction", "", partial(_refraction, result)))
@@ -136,7 +135,6 @@ def plate_drawings(result: Result) -> Layers:
 
 
 def night_drawings(result: CalibratedNight) -> Layers:
-    """Return the drawings of a night as layers."""
     return Layers("picture-layers", [*drawings(result, PICTURES).values()])
 
 

@@ -143,7 +143,6 @@ def descriptors(result: Result) -> list[str]:
 
 
 def have_common_weight(weights: Floats) -> bool:
-    """Return whether all weight matrices are equal."""
     return bool((weights == weights[:1]).all())
 
 

@@ -27,7 +27,6 @@ _STEPS = 10_000  # Largest number of rows of a curve table
 
 
 def _number(default: float | None, rule: str = "not-negative") -> Any:
-    """Return a field of finite numbers with a rule."""
     return field(default=default, metadata={"check": partial(number, rule=rule)})
 
 
@@ -382,8 +381,6 @@ def _chosen(names: tuple[str, ...], keep: Bools) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Counts:
-    """Numbers of observations and unknowns of an adjustment."""
-
     plate_observations: int  # Plate coordinates, including the axis
     star_observations: int  # Catalogue coordinates with a weight
     parameter_observations: int  # Parameters with a weight
@@ -393,12 +390,10 @@ class Counts:
 
     @property
     def observations(self) -> int:
-        """Total number of observations."""
         return self.plate_observations + self.star_observations + self.parameter_observations
 
     @property
     def unknowns(self) -> int:
-        """Total number of unknowns."""
         return self.parameter_unknowns + self.star_unknowns
 
     @property

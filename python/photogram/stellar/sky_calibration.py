@@ -165,12 +165,23 @@ def calibrate_exposures(
         raise InputError(phrase("error.missing", name="exposures"))
     require(0 < pixel_sd < LARGEST_SD, "pixel_sd", "range", low=0, high=LARGEST_SD, value=pixel_sd)
     if prior is not None and (prior.lens, prior.common_scale) != (camera.lens, common_scale):
-        lenses = _described(prior.lens, prior.common_scale), _described(camera.lens, common_scale)
-        raise InputError(phrase("stars.prior-lens", prior=lenses[0], camera=lenses[1]))
-    camera = _tied(camera, common_scale)
+        pairs = {"prior": (prior.lens, prior.common_scale), "camera": (camera.lens, common_scale)}
+        lenses = {
+            name: phrase("stars.lens-fx-fy" if common else "stars.lens", lens=lens)
+            for name, (lens, common) in pairs.items()
+        }
+        raise InputError(phrase("stars.prior-lens", **lenses))
+    values = camera.values.copy()
+    if common_scale and not camera.common_scale:
+        values[:2] = values[:2].mean()
+    camera = replace(camera, values=values, common_scale=common_scale)
     place = earth.site_of_date(site)
     images = _Images(exposures, place, catalogue, earth.dut1, weigh_stars)
-    _refuse_too_large(len(images.xy), len(exposures), weigh_stars)
+    needed = _PER_IMAGE * len(images.xy) + (16 * (3 * len(exposures)) ** 2 if weigh_stars else 0)
+    if (memory := available_memory()) is not None and needed > memory:
+        code = "stars.memory.stars" if weigh_stars else "stars.memory"
+        sizes = {"needed": needed / 2**30, "free": memory / 2**30}
+        raise AdjustmentError(phrase(code, exposures=len(exposures), images=len(images.xy), **sizes))
     free = np.array([name not in fixed for name in camera.names])
     free[1] &= not common_scale
     core = _core(images, exposures, camera, place, free, prior, pixel_sd)
@@ -191,17 +202,6 @@ def calibrate_exposures(
     return replace(result, attitudes=result.attitudes + np.remainder(change + np.pi, 2 * np.pi) - np.pi)
 
 
-def _described(lens: str, common_scale: bool) -> Phrase:
-    return phrase("stars.lens-fx-fy" if common_scale else "stars.lens", lens=lens)
-
-
-def _tied(camera: SkyCamera, common_scale: bool) -> SkyCamera:
-    values = camera.values.copy()
-    if common_scale and not camera.common_scale:
-        values[:2] = values[:2].mean()
-    return replace(camera, values=values, common_scale=common_scale)
-
-
 def _undetermined(error: _photocore.StellarError, camera: SkyCamera, exposures: int) -> Phrase:
     kind, message, indices = error.args
     if kind != "undetermined" or not indices:
@@ -212,15 +212,6 @@ def _undetermined(error: _photocore.StellarError, camera: SkyCamera, exposures: 
     if attitudes:
         names.append(phrase("stars.attitudes", numbers=attitudes))
     return phrase("stars.undetermined", names=names)
-
-
-def _refuse_too_large(images: int, exposures: int, weigh_stars: bool) -> None:
-    needed = _PER_IMAGE * images + (16 * (3 * exposures) ** 2 if weigh_stars else 0)
-    free = available_memory()
-    if free is not None and needed > free:
-        sizes = {"needed": needed / 2**30, "free": free / 2**30}
-        code = "stars.memory.stars" if weigh_stars else "stars.memory"
-        raise AdjustmentError(phrase(code, exposures=exposures, images=images, **sizes))
 
 
 def partials(

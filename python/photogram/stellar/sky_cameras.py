@@ -29,8 +29,6 @@ from photogram.words import phrase
 
 @dataclass(frozen=True)
 class Lens:
-    """Lens model of a digital camera."""
-
     model: str  # Camera model of `docs/cameras.md`
     # Parameters in the order of reports and files, fx, fy, cx, cy first; missing model parameters are zero
     names: tuple[str, ...]
@@ -41,12 +39,10 @@ class Lens:
 
     @property
     def order(self) -> tuple[str, ...]:
-        """All parameters of the model, in its order."""
         return parameter_names(self.model)
 
     @property
     def places(self) -> list[int]:
-        """Indices of the parameters in the model."""
         return [self.order.index(name) for name in self.names]
 
     @property
@@ -372,7 +368,11 @@ def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
     )
     if values[0, 1] or not np.array_equal(values[[1, 2, 2, 2], [0, 0, 1, 2]], [0, 0, 0, 1]):
         raise matrix.error(phrase("stars.camera-matrix", value=str(values.tolist())))
-    lens, terms = _MODELS[_model_in(content)]
+    # The distortion model that the file specifies
+    model = "plumb_bob" if content.get("fisheye_model", 0).value in (0, False) else "equidistant"
+    if "distortion_model" in content:
+        model = content["distortion_model"].choice(_MODELS)
+    lens, terms = _MODELS[model]
     if any(coefficients[len(terms) :]):
         raise distortion.error(phrase("stars.more-terms", terms=list(terms)))
     parameters = {"fx": values[0, 0], "fy": values[1, 1], "cx": values[0, 2], "cy": values[1, 2]}
@@ -383,10 +383,3 @@ def read_yaml(path: Path) -> tuple[SkyCamera, tuple[float, float]]:
 
 def _member(content: Tree, *keys: str) -> Tree:
     return content[next((key for key in keys if key in content), keys[0])]
-
-
-def _model_in(content: Tree) -> str:
-    """Return the distortion model that a file specifies."""
-    if "distortion_model" in content:
-        return content["distortion_model"].choice(_MODELS)
-    return "plumb_bob" if content.get("fisheye_model", 0).value in (0, False) else "equidistant"

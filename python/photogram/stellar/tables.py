@@ -46,7 +46,6 @@ _NONE = np.zeros(0)
 
 
 def parameters(result: Result) -> list[Table]:
-    """Return prior and adjusted parameters with weighted changes (section 5.9a)."""
     problem, count = result.problem, len(NAMES) if result.problem.options.refraction else 22
     names, free = NAMES[:count], result.solved.free[:count]
     weights = np.diag(problem.parameter_weights)[:count]
@@ -81,7 +80,6 @@ def parameters(result: Result) -> list[Table]:
 
 
 def stages(result: Result) -> list[Table]:
-    """Return the solutions of the run, and the discrepancy levels of all iterations."""
     counts = {field.name: f"counts.{field.name}" for field in fields(Counts)}
     attributes = {
         "solution": "solution",
@@ -115,7 +113,6 @@ def stages(result: Result) -> list[Table]:
 
 
 def transformed(result: Result) -> Table:
-    """Return the transformed attitudes."""
     attitudes = result.transformed_attitudes()
     columns = [
         names_column(attitudes, "Orientation"),
@@ -189,7 +186,6 @@ def _ellipses(ellipses: Floats, of: str) -> list[Quantity]:
 
 
 def directions(result: Result) -> Table:
-    """Return unknown directions with orientation and total ellipses."""
     found = result.directions()
     columns = [
         names_column((result.problem.star_ids[star] for star in found.stars), "Star"),
@@ -242,7 +238,6 @@ def fictitious(result: Result) -> Table:
 
 
 def images(result: Result) -> Table:
-    """Return plate coordinates with residuals v, redundancy r and tests w."""
     problem, solved = result.problem, result.solved
     columns = [
         names_column(problem.image_points, "Point", "point"),
@@ -265,7 +260,6 @@ def _before(result: Result, weights: Floats) -> Floats:
 
 
 def means(result: Result) -> Table:
-    """Return means of stars with several images, and radial and tangential residuals."""
     rows = list(star_means(result))
     columns = [
         names_column((star for star, *_ in rows), "Star", "star"),
@@ -278,7 +272,6 @@ def means(result: Result) -> Table:
 
 
 def pre_run(result: Result) -> Table:
-    """Return residuals of the images not used in the minimum solution."""
     found = result.pre_run
     columns = [
         names_column(found.stars if found else (), "Star"),
@@ -289,7 +282,6 @@ def pre_run(result: Result) -> Table:
 
 
 def movement(result: Result) -> Table:
-    """Return angles between the directions of a point under two attitudes."""
     found = result.movement
     pairs = [pair for pair in found.pairs for _ in DIAGONAL] if found else []
     parts = "ra cos dec, declination, azimuth sin z, elevation"
@@ -307,7 +299,6 @@ def movement(result: Result) -> Table:
 
 
 def distortion(result: Result) -> Table:
-    """Return distortion and its mean errors against the distance from its centre."""
     curves = distortion_curves(result) if result.problem.options.curves else None
     columns = [column(getattr(curves, "distance", _NONE), MM, "Distance", 1)]
     for name in ("radial", "transformed", "decentering"):
@@ -323,7 +314,6 @@ def distortion(result: Result) -> Table:
 
 
 def refraction(result: Result) -> Table:
-    """Return refraction around the axes for given and corrected coefficients."""
     groups = result.groups if result.problem.options.refraction else ()
     curves = [refraction_curves(result, group) for group in groups]
     names = np.repeat(groups, [len(curve.zenith_distance) for curve in curves])
@@ -340,7 +330,6 @@ def refraction(result: Result) -> Table:
 
 
 def histograms(result: Result) -> list[Table]:
-    """Return classes of the residuals of known stars, with normal frequencies."""
     tables = []
     for name, values in residual_classes(result).items():
         found = histogram(1e6 * values)

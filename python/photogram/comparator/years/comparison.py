@@ -296,7 +296,6 @@ def _history(
 
 
 def _certified(records: Sequence[RecordedCalibration], together: Together, plate: int) -> Grid:
-    """Return a plate adjusted from all calibrations."""
     grid = together.grids[plate]
     days = [each.day.isoformat() for each in records if plate in each.grids]
     sigma = math.sqrt(float(np.diag(together.covariance_um2[plate]).mean()))

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 
 def calibrations(comparison: Comparison) -> Table:
-    """Return the calibrations with days, plates, and precisions."""
     found = comparison.calibrations
     plates = [", ".join(map(str, each.grids)) for each in found]
     celsius, squares = (Axis.of("", "°C"),), (Axis.of("", "um2"),)
@@ -40,7 +39,6 @@ def calibrations(comparison: Comparison) -> Table:
 
 
 def operators(comparison: Comparison) -> Table:
-    """Return the operators with their pointing precision in all calibrations."""
     values = np.array([*comparison.operators.values()]).reshape(-1, 3)
     pointing, freedom = values[:, :2], values[:, 2].astype(int)
     head = "sd of a pointing in {}"
@@ -53,7 +51,6 @@ def operators(comparison: Comparison) -> Table:
 
 
 def comparison_findings(comparison: Comparison) -> Findings:
-    """Return the tests of a comparison: all readings, and changes over time."""
     places = [
         (record.name, case.number, point, axis)
         for record in comparison.calibrations
@@ -81,7 +78,6 @@ def comparison_findings(comparison: Comparison) -> Findings:
 
 
 def comparison_document(comparison: Comparison) -> Document:
-    """Return the document of a comparison."""
     together = comparison.together
     given = {plate: grid.sigma_um or 0.0 for plate, grid in together.grids.items()}
     grids = [

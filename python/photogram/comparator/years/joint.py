@@ -32,8 +32,6 @@ from photogram.words import phrase
 
 @dataclass(frozen=True, eq=False)
 class Together:
-    """Result of the adjustment of all calibrations."""
-
     parameters: list[Floats]  # Correction parameters (21,) of each calibration
     covariance: Floats  # (k, 21, k, 21) covariance of all parameters; zero for fixed ones
     grids: dict[int, Grid]  # Plates as given to the first calibration with each
@@ -63,12 +61,10 @@ class _Equations:
 
     @property
     def right(self) -> Floats:
-        """The right-hand side of the own unknowns."""
         return -self.own.T @ (self.weight * self.rest)
 
 
 def adjust_together(records: Sequence[RecordedCalibration]) -> Together:
-    """Adjust all calibrations together."""
     grids = _grids(records)
     starts = dict(zip(grids, np.cumsum([0, *(len(grid.points) for grid in grids.values())]), strict=False))
     size = 2 * sum(len(grid.points) for grid in grids.values())
