@@ -22,7 +22,7 @@ from photogram.comparator.averages import listed_grid_sigma, text_grid_sigma
 from photogram.comparator.case import exchanged
 from photogram.comparator.correction import partials_of
 from photogram.comparator.fits import rotation_matrix
-from photogram.comparator.joint import Weights, adjust_jointly
+from photogram.comparator.joint import adjust_jointly
 from photogram.comparator.listing import correction_table, table_nodes
 from photogram.comparator.tables import LINEAR
 from photogram.comparator.variance import AxisSigma, _f_max_tail, compare_case_variances, difference
@@ -530,8 +530,7 @@ def test_feature_23_published_pages_have_nothing_of_ours():
 def test_the_joint_adjustment_under_the_assumptions_of_the_report_is_its_weighted_mean(full):
     assert full.joint_check < 1e-3
     placed = [case.placed for case in full.cases]
-    weights = Weights({1: 0.0}, random_um=1.0)
-    joint = adjust_jointly(placed, full.session.grids, full.linear, weights, polynomial=False)
+    joint = adjust_jointly(placed, full.session.grids, full.linear, {1: 0.0}, random_um=1.0, polynomial=False)
     sd = np.sqrt(np.diag(full.linear.covariance))
     assert (joint.covariance - full.linear.covariance) / np.outer(sd, sd) == pytest.approx(
         np.zeros((3, 3)), abs=1e-3

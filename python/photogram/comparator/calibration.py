@@ -20,7 +20,7 @@ from photogram.comparator.case import Closeout, PlacedCase, close_out, place_cas
 from photogram.comparator.correction import Correction, Identity, parameters_of
 from photogram.comparator.fits import AffineFit, Residuals, RigidFit, fit_affine, fit_rigid
 from photogram.comparator.grid import Grid, with_corrections
-from photogram.comparator.joint import LEAST_UM, JointFit, Weights, adjust_jointly
+from photogram.comparator.joint import LEAST_UM, JointFit, adjust_jointly
 from photogram.comparator.options import Options
 from photogram.comparator.outliers import (
     FarPointing,
@@ -431,7 +431,7 @@ def _joint(
             messages.append(Message(phrase("comparators.fixed-grid", plate=plate)))
             grid[plate] = 0.0
     try:
-        joint = adjust_jointly(placed, session.grids, linear, Weights(grid, known), polynomial=polynomial)
+        joint = adjust_jointly(placed, session.grids, linear, grid, pointing_um=known, polynomial=polynomial)
     except AdjustmentError as error:
         messages.append(Message(message_of(error)))
         return None
@@ -441,8 +441,10 @@ def _joint(
 
 def _joint_check(session: Session, placed: Sequence[PlacedCase], linear: CombinedLinear) -> float:
     """Return the largest difference of weighted mean and joint adjustment, in sd."""
-    fixed = Weights(dict.fromkeys(session.grids, 0.0), random_um=max(linear.sigma0_um, LEAST_UM))
-    joint = adjust_jointly(placed, session.grids, linear, fixed, polynomial=False).correction
+    fixed, random = dict.fromkeys(session.grids, 0.0), max(linear.sigma0_um, LEAST_UM)
+    joint = adjust_jointly(
+        placed, session.grids, linear, fixed, random_um=random, polynomial=False
+    ).correction
     differences = np.abs(parameters_of(linear.correction) - parameters_of(joint))[:3]
     return float((differences / np.sqrt(np.diag(joint.covariance)[:3])).max())
 

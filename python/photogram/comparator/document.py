@@ -31,6 +31,7 @@ from photogram.show.page import (
     Layers,
     Part,
     Section,
+    about,
     conventions,
 )
 from photogram.show.quantity import members
@@ -42,12 +43,6 @@ if TYPE_CHECKING:
 
 
 UM = "µm"
-POLYNOMIALS = (
-    "What is added to linearly corrected coordinates: polynomials of fourth degree in metres. Each term"
-    " is tested with"
-    " its argument from -1 to 1 over the measured range, so that its coefficient is its effect at the edge."
-)
-JOINT = "All cases, comparator, polynomials and grid in one adjustment, with the accuracy of the grid."
 
 
 def calibration_document(calibration: Calibration) -> Document:
@@ -74,10 +69,10 @@ def calibration_document(calibration: Calibration) -> Document:
             Section("variance", "Where the errors come from", [by_variance], by_variance.about),
             Section("pictures", "Pictures", [Layers("picture-layers", drawings)]),
             Section.of(linear(own.correction, own.covariance, own.degrees_of_freedom)),
-            Section("polynomials", "Polynomials", polynomials, POLYNOMIALS),
+            Section("polynomials", "Polynomials", polynomials, about("comparator.polynomials")),
             Section.of(of_cases),
             Section("outliers", "Readings that do not agree", disagreeing),
-            Section("joint", "Joint adjustment", _joint(calibration), JOINT),
+            Section("joint", "Joint adjustment", _joint(calibration), about("comparator.joint")),
             Section.of(verdict_table(verdict)),
             remarks_section(calibration.messages),
         ],

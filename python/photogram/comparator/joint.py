@@ -32,16 +32,6 @@ SETTLED = 1e-6  # relative change of standard deviations
 LEAST_UM = 1e-3  # Lower limit of estimated standard deviations, a nanometre
 
 
-@dataclass(frozen=True)
-class Weights:
-    """Standard deviations that define the weights."""
-
-    # Standard deviation of a grid coordinate, by plate: zero fixes the grid; None estimates it
-    grid_um: Mapping[int, float | None]
-    pointing_um: tuple[float, float] = (0.0, 0.0)  # Standard deviations of a single pointing in x and in y
-    random_um: float | None = None  # Standard deviation of the comparator; None estimates it
-
-
 @dataclass(frozen=True, eq=False)
 class JointCase:
     number: int  # Number of the case
@@ -96,21 +86,27 @@ def adjust_jointly(
     cases: Sequence[PlacedCase],
     grids: Mapping[int, Grid],
     linear: CombinedLinear,
-    weights: Weights,
+    grid_um: Mapping[int, float | None],
     *,
+    pointing_um: tuple[float, float] = (0.0, 0.0),
+    random_um: float | None = None,
     polynomial: bool = True,
 ) -> JointFit:
-    """Adjust all cases jointly, starting from the combined linear adjustment."""
-    problem = _Problem(cases, grids, linear, weights, polynomial)
-    random = weights.random_um if weights.random_um is not None else max(linear.sigma0_um, LEAST_UM)
-    grid = {plate: random / 2 if sigma is None else sigma for plate, sigma in weights.grid_um.items()}
+    """Adjust all cases jointly, starting from the combined linear adjustment.
+
+    Weights follow from standard deviations: of grid coordinates by plate (zero fixes the grid), of a single
+    pointing in x and in y, and of the comparator. None estimates them.
+    """
+    problem = _Problem(cases, grids, linear, grid_um, pointing_um, polynomial)
+    random = random_um if random_um is not None else max(linear.sigma0_um, LEAST_UM)
+    grid = {plate: random / 2 if sigma is None else sigma for plate, sigma in grid_um.items()}
     for _ in range(MAX_ROUNDS):
         problem.solve(grid, random)
         before, grid_before = random, dict(grid)
-        if weights.random_um is None:
+        if random_um is None:
             random = problem.random()
         for plate in grid:
-            if weights.grid_um[plate] is None:
+            if grid_um[plate] is None:
                 grid[plate] *= math.sqrt(max(problem.grid_test(plate, grid[plate])[0], 0.01))
                 grid[plate] = max(grid[plate], LEAST_UM)
         changes = [abs(random - before), *(abs(grid[plate] - grid_before[plate]) for plate in grid)]
@@ -133,10 +129,11 @@ class _Problem:
         cases: Sequence[PlacedCase],
         grids: Mapping[int, Grid],
         linear: CombinedLinear,
-        weights: Weights,
+        grid_um: Mapping[int, float | None],
+        pointing_um: tuple[float, float],
         polynomial: bool,
     ) -> None:
-        self.cases, self.weights = cases, weights
+        self.cases, self.grid_um = cases, grid_um
         self.measured_cases = np.repeat(np.arange(len(cases)), [len(case.points) for case in cases])
         points = np.concatenate([case.points for case in cases])
         self.plates = plates = list(dict.fromkeys(case.case.plate for case in cases))
@@ -145,13 +142,10 @@ class _Problem:
             rank * (points.max() + 1) + points, return_index=True, return_inverse=True
         )
         self.points, self.plate_of = points[first], np.array(plates)[rank[first]]
-        self.grid_xy = np.vstack(
-            [
-                grids[plate].xy_um[grids[plate].rows_of(self.points[self.plate_of == plate])]
-                for plate in plates
-            ]
-        )
-        self.counts = np.concatenate([case.counts for case in cases])
+        own = [(grids[plate], self.points[self.plate_of == plate]) for plate in plates]
+        self.grid_xy = np.vstack([grid.xy_um[grid.rows_of(some)] for grid, some in own])
+        counts = np.concatenate([case.counts for case in cases])
+        self.pointing = np.array(pointing_um) ** 2 / counts[:, np.newaxis]
         self.frame = frame = Frame.of(np.vstack([fit.residuals.xy_um for fit in linear.cases]))
         self.placements = [
             [fit.rotation_rad, *(rotation_matrix(fit.rotation_rad) @ frame.centre_um + fit.translation_um)]
@@ -159,12 +153,9 @@ class _Problem:
         ]
         self.coefficient_sd = [math.inf if polynomial else 0.0] * OWN_TERMS
 
-    def _pointing(self) -> Floats:
-        return np.asarray(np.array(self.weights.pointing_um) ** 2 / self.counts[:, np.newaxis])
-
     def solve(self, grid: Mapping[int, float], random: float) -> None:
         """Adjust with given standard deviations of grid and comparator."""
-        self.variance = random**2 + self._pointing()
+        self.variance = random**2 + self.pointing
         sd = np.array([grid[plate] for plate in self.plate_of.tolist()])
         try:
             self.solution = _photocore.adjust_comparator(
@@ -193,7 +184,7 @@ class _Problem:
         """Estimate the comparator sd by equating weighted squares and redundancy."""
         squares = float((self.solution.residuals**2 / self.variance).sum())
         ratio = squares / float(self.solution.redundancy.sum())
-        variance = ratio * float(self.variance.mean()) - float(self._pointing().mean())
+        variance = ratio * float(self.variance.mean()) - float(self.pointing.mean())
         return math.sqrt(max(variance, LEAST_UM**2))
 
     def grid_test(self, plate: int, sigma_um: float) -> tuple[float, GlobalTest | None]:
@@ -252,7 +243,7 @@ class _Problem:
         )
 
     def _plate(self, plate: int, sigma_um: float, scale: float) -> JointPlate:
-        rows, estimated = self.plate_of == plate, self.weights.grid_um[plate] is None
+        rows, estimated = self.plate_of == plate, self.grid_um[plate] is None
         ratio, test = self.grid_test(plate, sigma_um) if sigma_um > 0 else (None, None)
         return JointPlate(
             points=self.points[rows],

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -59,7 +60,8 @@ def listing(calibration: Calibration, run_date: str = "") -> str:
         for case, fit in zip(calibration.cases, calibration.linear.cases, strict=True)
     ]
     if calibration.nonlinear:
-        pages += [combined_polynomial_page(calibration), correction_table(calibration)]
+        pages += [combined_polynomial_page(calibration.nonlinear, len(calibration.cases))]
+        pages += [correction_table(calibration)]
         pages += [
             residual_page(f"CASE NUMBER {case.number} WITH ALL FINAL CORRECTIONS", case, fit.residuals)
             for case, fit in zip(calibration.cases, calibration.nonlinear.cases, strict=True)
@@ -71,18 +73,18 @@ def listing(calibration: Calibration, run_date: str = "") -> str:
     return "\f\n".join("\n".join(line.rstrip() for line in page) + "\n" for page in pages)
 
 
-def _case_pages(calibration: Calibration, case: CaseResult) -> list[list[str]]:
-    pages = [
-        residual_page(
-            f"CASE NUMBER {case.number} FREE ADJUSTMENT (ROTATION AND TRANSLATION)", case, case.free.residuals
-        ),
-        case_linear_page(case),
-    ]
-    if case.polynomial:
-        pages.append(case_polynomial_page(case, case.polynomial))
+def _case_pages(calibration: Calibration, case: CaseResult) -> Iterator[list[str]]:
+    name, own, linear = f"CASE NUMBER {case.number}", case.linear.parameters, case.linear
+    yield residual_page(f"{name} FREE ADJUSTMENT (ROTATION AND TRANSLATION)", case, case.free.residuals)
+    sd = math.sqrt(linear.covariance[3, 3]) / ARCSEC
+    rotation = f"  ROTATION {angle(own.rotation_rad)}   SIGMA {sd:8.3f} SEC"
+    lines = [*linear_lines(own, linear.covariance), rotation, ""]
+    yield residual_page(f"{name} LINEAR ADJUSTMENT", case, linear.residuals, lines)
+    if (single := case.polynomial) is not None:
+        lines = [*covariance_lines(single), ""]
+        yield residual_page(f"{name} NONLINEAR ADJUSTMENT", case, single.residuals, lines)
         if calibration.session.plot_each_case:
-            pages.append(correction_table(calibration, case))
-    return pages
+            yield correction_table(calibration, case)
 
 
 def _averages(calibration: Calibration, *stages: str) -> list[list[str]]:
@@ -176,39 +178,26 @@ POINTING_HEAD = [
 
 
 def pointing_pages(calibration: Calibration) -> list[list[str]]:
-    pages = [_case_page(case) for case in calibration.cases]
-    for operator, (points, total) in calibration.pointing.operators.items():
-        own = [case for case in calibration.cases if case.placed.case.operator == operator]
-        title = f"OPERATOR NUMBER {operator} POINTING PRECISION STATISTICS"
-        pages.append(_pooled_page(title, points, total, len(own), 1))
-    pointing = calibration.pointing
-    counts = (len(calibration.cases), len(pointing.operators))
-    title = "TOTAL POINTING PRECISION STATISTICS"
-    return [*pages, _pooled_page(title, pointing.points, pointing.total, *counts)]
-
-
-def _case_page(case: CaseResult) -> list[str]:
-    placed = case.placed
-    title = f"CASE NUMBER {placed.number} POINTING PRECISION STATISTICS"
-    rows = [
-        _row(f"{readings.point:7d}", readings.precision, *readings.mean_um.tolist())
-        for readings in placed.readings
-    ]
-    return _page(title, rows, placed.precision, f"OPERATOR NUMBER {placed.case.operator}", 1, 1)
-
-
-def _pooled_page(
-    title: str, points: dict[int, Precision], total: Precision, cases: int, operators: int
-) -> list[str]:
-    rows = [_row(f"{point:7d}", precision) for point, precision in sorted(points.items())]
-    return _page(title, rows, total, "", cases, operators)
+    cases, pointing, pages = [case.placed for case in calibration.cases], calibration.pointing, []
+    for placed in cases:
+        rows = [_row(each.point, each.precision, *each.mean_um.tolist()) for each in placed.readings]
+        operator = f"OPERATOR NUMBER {placed.case.operator}"
+        pages.append(_page(f"CASE NUMBER {placed.number}", rows, placed.precision, (1, 1), operator))
+    count = Counter(placed.case.operator for placed in cases)
+    pooled = [(f"OPERATOR NUMBER {k}", *own, (count[k], 1)) for k, own in pointing.operators.items()]
+    for title, points, total, counts in (
+        *pooled,
+        ("TOTAL", pointing.points, pointing.total, (len(cases), len(count))),
+    ):
+        rows = [_row(point, precision) for point, precision in sorted(points.items())]
+        pages.append(_page(title, rows, total, counts))
+    return pages
 
 
 def _page(
-    title: str, rows: Iterable[str], total: Precision, head: str, cases: int, operators: int
+    title: str, rows: Iterable[str], total: Precision, counts: tuple[int, int], head: str = ""
 ) -> list[str]:
     basis = f"{total.points} POINTS, {total.readings} MEASUREMENTS"
-    counts = f"({cases} CASES, {operators} OPERATORS)"
     ellipse = (
         f"ERROR ELLIPSE OF A POINTING (39 PERCENT): SEMI-AXES {total.ellipse.major_um:.3f} AND"
         f" {total.ellipse.minor_um:.3f} MICRONS, MAJOR AXIS {math.degrees(total.ellipse.angle_rad):.1f}"
@@ -217,26 +206,26 @@ def _page(
         else "NO REPEATED READINGS"
     )
     return [
-        *centred(title),
+        *centred(f"{title} POINTING PRECISION STATISTICS"),
         *([head, ""] if head else []),
         *POINTING_HEAD,
         *rows,
         "COMBINED POINT STATISTICS",
-        _row("       ", total),
+        _row("", total),
         "",
-        f"BASIS / {basis} {counts}",
+        "BASIS / {} ({} CASES, {} OPERATORS)".format(basis, *counts),
         ellipse,
     ]
 
 
-def _row(name: str, own: Precision, mean_x: float | None = None, mean_y: float | None = None) -> str:
+def _row(name: int | str, own: Precision, mean_x: float | None = None, mean_y: float | None = None) -> str:
     """Return a line of eleven numbers in the order of figure 7."""
     single = "".join(number(value, 9, 3) for value in (*own.sd_um, own.sd_point_um))
     means = "".join(number(value, 13, 2) for value in (mean_x, mean_y))
     of_means = "".join(number(value, 9, 3) for value in (*own.mean_sd_um, own.mean_sd_point_um))
     correlation = number(own.listed_correlation_percent, 10, 2)
     covariance = number(own.covariance_um2, 12, 3)
-    return f"{name}{own.readings:8d}{single}{covariance}{correlation}{means}     {of_means}"
+    return f"{name:>7}{own.readings:8d}{single}{covariance}{correlation}{means}     {of_means}"
 
 
 AVERAGES_HEAD = [
@@ -343,19 +332,6 @@ def covariance_lines(fit: SinglePolynomial | CombinedPolynomial) -> list[str]:
     ]
 
 
-def case_linear_page(case: CaseResult) -> list[str]:
-    fit = case.linear
-    own, sd = fit.parameters, math.sqrt(fit.covariance[3, 3]) / ARCSEC
-    rotation = f"  ROTATION {angle(own.rotation_rad)}   SIGMA {sd:8.3f} SEC"
-    lines = [*linear_lines(own, fit.covariance), rotation, ""]
-    return residual_page(f"CASE NUMBER {case.number} LINEAR ADJUSTMENT", case, fit.residuals, lines)
-
-
-def case_polynomial_page(case: CaseResult, single: SinglePolynomial) -> list[str]:
-    title = f"CASE NUMBER {case.number} NONLINEAR ADJUSTMENT"
-    return residual_page(title, case, single.residuals, [*covariance_lines(single), ""])
-
-
 def combined_linear_page(calibration: Calibration) -> list[str]:
     combined = calibration.linear
     placements = [
@@ -374,14 +350,10 @@ def combined_linear_page(calibration: Calibration) -> list[str]:
     ]
 
 
-def combined_polynomial_page(calibration: Calibration) -> list[str]:
-    """Return the page of the combined polynomials, empty without polynomials."""
-    nonlinear = calibration.nonlinear
-    if nonlinear is None:
-        return []
+def combined_polynomial_page(nonlinear: CombinedPolynomial, cases: int) -> list[str]:
     sigma_x, sigma_y = nonlinear.sigma_um
     return [
-        *centred(f"COMBINED NONLINEAR ADJUSTMENT OF {len(calibration.cases)} CASES"),
+        *centred(f"COMBINED NONLINEAR ADJUSTMENT OF {cases} CASES"),
         *covariance_lines(nonlinear),
         "",
         f"  SIGMA X = {sigma_x:.4f}   SIGMA Y = {sigma_y:.4f}"
@@ -514,10 +486,6 @@ HEAD = [
 def residual_page(
     title: str, case: CaseResult, residuals: Residuals, parameters: Sequence[str] = ()
 ) -> list[str]:
-    return [*centred(title), nearest(case), "", *parameters, *residual_lines(residuals)]
-
-
-def residual_lines(residuals: Residuals) -> list[str]:
     rows = zip(
         residuals.points.tolist(),
         residuals.xy_um.tolist(),
@@ -532,7 +500,21 @@ def residual_lines(residuals: Residuals) -> list[str]:
     squares = sums("SUM VV", residuals.squares_um2, 35, 15)
     sigma = sums("SIGMA", residuals.sigma_um, 35, 15)
     unit = f"STANDARD ERROR OF UNIT WEIGHT ={number(residuals.sigma0_um, 9, 4)} MICRONS"
-    return [*HEAD, *lines, "", squares, f"  N = {len(residuals.points)}", sigma, "", unit]
+    count = f"  N = {len(residuals.points)}"
+    return [
+        *centred(title),
+        nearest(case),
+        "",
+        *parameters,
+        *HEAD,
+        *lines,
+        "",
+        squares,
+        count,
+        sigma,
+        "",
+        unit,
+    ]
 
 
 def sums(name: str, values: Iterable[float], width: int, gap: int) -> str:

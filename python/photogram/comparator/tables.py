@@ -52,11 +52,7 @@ def variance(calibration: Calibration) -> Table:
         Quantity(values, (*XY, Axis.of("Total", "um")), "deviation", head="{}", decimals=3),
     ]
     note = f"Negative variances, set to 0: {', '.join(own.negative)}." if own.negative else ""
-    about = (
-        "Standard deviations: what a coordinate is uncertain by before and after each step, and the parts of"
-        " comparator, grid and pointing in it."
-    )
-    return Table("variance", "Analysis of variance", columns, note, about)
+    return Table("variance", "Analysis of variance", columns, note, about("comparator.variance"))
 
 
 def linear(
@@ -74,11 +70,8 @@ def linear(
         Quantity(sd, LINEAR_AXES, "deviation", head="sd", of=of),
         Quantity(less_one, (Axis.of("", "um/m"),), "deviation", head="Less one", decimals=2),
     ]
-    about = (
-        "Scales by which readings are multiplied, less one in micrometres a metre, and the lack of"
-        " orthogonality of the axes."
-    )
-    return Table(key, "Linear parameters", columns, f"{freedom} degrees of freedom", about, sd)
+    note = f"{freedom} degrees of freedom"
+    return Table(key, "Linear parameters", columns, note, about("comparator.linear"), sd)
 
 
 def terms(test: PolynomialTest) -> Table:

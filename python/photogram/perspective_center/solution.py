@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
@@ -232,12 +233,12 @@ def determine(
         raise InputError(phrase("projector.published-interior"))
     try:
         if unknown:
-            return _result(grid, weight, *_calibrated(grid, weight, unknown), unknown)
-        course, messages = (_as_published if as_published else _strictly)(grid, _observed(grid, weight))
+            solution = _calibrated(grid, weight, unknown)
+        else:
+            solution = (_as_published if as_published else _strictly)(grid, weight)
     except RankError as error:
         raise RankError(phrase("projector.singular", error=message_of(error)), [], error.points) from None
-    joint = course.partials, course.solution.cofactors
-    return _result(grid, weight, grid, course, messages, *joint, as_published=as_published)
+    return _result(grid, weight, solution, unknown, as_published=as_published)
 
 
 def _observed(grid: Grid, weight: Floats) -> Observed:
@@ -248,97 +249,83 @@ def _observed(grid: Grid, weight: Floats) -> Observed:
 
 
 @dataclass(frozen=True, eq=False)
-class _Iterated:
-    """An iteration of k cycles and its final state."""
+class _Solution:
+    """A solution of the pose, and of the k unknowns of the interior."""
 
-    # The last solution of the core: cofactors, degrees of freedom, points behind
-    solution: _photocore.ResectionSolution
-    # (k + 1, 6) poses, the start first, and (k, 6) corrections: X, Y, Z, angles in radians
+    grid: Grid  # With the interior of the solution
+    core: _photocore.ResectionSolution  # Last solution of the core: degrees of freedom, points behind
+    # (c + 1, 6) poses of c cycles, the start first, and (c, 6) corrections: X, Y, Z, angles in radians
     history: Floats
     corrections: Floats
-    residuals: Floats  # (n, 2) given minus computed plate coordinates, and (n, 2, 6), at the last pose
-    partials: Floats
+    residuals: Floats  # (n, 2) given minus computed plate coordinates
+    partials: Floats  # (n, 2, 6 + k)
+    cofactors: Floats
     converged: bool  # Whether the convergence criterion was met
+    messages: list[Message]
 
 
-Solved = tuple[_Iterated, list[Message]]
-
-
-def _strictly(grid: Grid, observed: Observed) -> Solved:
+def _strictly(grid: Grid, weight: Floats) -> _Solution:
     """Adjust to strict convergence, from a direct solution if the approximations fail."""
     starts = [grid.initial] if grid.initial is not None else []
-    messages = []
+    observed, messages = _observed(grid, weight), []
     for start in [*starts, None]:
         try:
-            solution = solve(observed, start=start, limit=STRICT_FRACTION, max_iterations=STRICT_CYCLES)
+            core = solve(observed, start=start, limit=STRICT_FRACTION, max_iterations=STRICT_CYCLES)
         except AdjustmentError:
             if start is None:
                 raise
         else:
-            if start is None or (solution.status == "converged" and not solution.points_behind.size):
+            if start is None or (core.status == "converged" and not core.points_behind.size):
                 break
         messages = [Message.of("projector.direct-start")]
-    history: Floats = np.vstack([solution.start, solution.history])
-    return _Iterated(
-        solution,
-        history,
-        np.diff(history, axis=0),
-        solution.residuals,
-        solution.partials,
-        solution.status == "converged",
-    ), messages
+    history: Floats = np.vstack([core.start, core.history])
+    states = history, np.diff(history, axis=0), core.residuals, core.partials, core.cofactors
+    return _Solution(grid, core, *states, core.status == "converged", messages)
 
 
-def _as_published(grid: Grid, observed: Observed) -> Solved:
+def _as_published(grid: Grid, weight: Floats) -> _Solution:
     if grid.initial is None:
         raise InputError(phrase("projector.no-approximations"))
+    observed = _observed(grid, weight)
     # Parameters are REAL*4 words, angles in minutes: truncated digits return as a last correction.
     units = np.array([1.0, 1.0, 1.0, *[MINUTES_PER_RADIAN] * 3])
     history: list[Floats] = [single(grid.initial * units) / units]
     corrections: list[Floats] = []
     converged = False
+    step = partial(solve, criterion="position", limit=grid.tolerance, max_iterations=1, at_measured=True)
     while not converged and len(corrections) < MOST_CYCLES:
-        solution = solve(
-            observed,
-            start=history[-1],
-            criterion="position",
-            limit=grid.tolerance,
-            max_iterations=1,
-            at_measured=True,
-        )
-        if solution.status == "diverged":
+        core = step(observed, start=history[-1])
+        if core.status == "diverged":
             raise RankError(phrase("projector.diverged"), [], observed.names)
-        corrections.append(solution.pose - history[-1])
-        history.append(single(solution.pose * units) / units)
+        corrections.append(core.pose - history[-1])
+        history.append(single(core.pose * units) / units)
         converged = bool(np.linalg.norm(corrections[-1][:3]) < grid.tolerance)
-    residuals: Floats = solution.residuals + solution.partials @ (solution.pose - history[-1])
-    course = np.array(history), np.array(corrections)
-    return _Iterated(solution, *course, residuals, solution.partials, converged), []
+    residuals: Floats = core.residuals + core.partials @ (core.pose - history[-1])
+    states = np.array(history), np.array(corrections), residuals, core.partials, core.cofactors
+    return _Solution(grid, core, *states, converged, [])
 
 
-def _calibrated(
-    grid: Grid, weight: Floats, unknown: tuple[str, ...]
-) -> tuple[Grid, _Iterated, list[Message], Floats, Floats]:
+def _calibrated(grid: Grid, weight: Floats, unknown: tuple[str, ...]) -> _Solution:
     """Estimate pose and interior together; the pose is solved again for each interior."""
     chosen = [INTERIOR.index(name) for name in unknown]
     interior = np.array([grid.principal_distance, 0.0, 0.0])
     own = grid
     root = np.sqrt(weight)[:, np.newaxis]
     for _ in range(STRICT_CYCLES):
-        course, messages = _strictly(own, _observed(own, weight))
-        of_c = (own.plate_xy - course.residuals) / own.principal_distance
+        solution = _strictly(own, weight)
+        of_c = (own.plate_xy - solution.residuals) / own.principal_distance
         of_point = np.broadcast_to(np.eye(2), (len(grid.ids), 2, 2))
         columns = np.concatenate([of_c[:, :, np.newaxis], of_point], axis=2)[:, :, chosen]
-        partials: Floats = np.concatenate([course.partials, columns], axis=2)
+        partials: Floats = np.concatenate([solution.partials, columns], axis=2)
         rows = (partials * root[:, :, np.newaxis]).reshape(-1, 6 + len(chosen))
         scale = np.linalg.norm(rows, axis=0)
         _, sizes, turn = np.linalg.svd(rows / scale, full_matrices=False)
         if len(rows) < len(scale) or sizes[-1] < STEEPEST * sizes[0]:
             raise _open(unknown, grid)
         cofactors: Floats = (turn.T / sizes**2) @ turn / np.outer(scale, scale)
-        step = (cofactors @ rows.T @ (course.residuals * root).ravel())[6:]
+        step = (cofactors @ rows.T @ (solution.residuals * root).ravel())[6:]
         if (np.abs(step) <= STRICT_FRACTION * np.sqrt(np.diagonal(cofactors)[6:])).all():
-            return own, course, messages, partials, cofactors
+            return replace(solution, partials=partials, cofactors=cofactors)
         interior[chosen] += step
         if not 0.5 < interior[0] / grid.principal_distance < 2.0:
             raise _open(unknown, grid)
@@ -353,44 +340,36 @@ def _open(unknown: tuple[str, ...], grid: Grid) -> RankError:
 
 
 def _result(
-    grid: Grid,
-    weight: Floats,
-    own: Grid,
-    course: _Iterated,
-    messages: list[Message],
-    partials: Floats,
-    cofactors: Floats,
-    unknown: Sequence[str] = (),
-    *,
-    as_published: bool = False,
+    grid: Grid, weight: Floats, solution: _Solution, unknown: tuple[str, ...], *, as_published: bool
 ) -> PerspectiveCenter:
-    solution, history, corrections = course.solution, course.history, course.corrections
+    own, core, messages = solution.grid, solution.core, solution.messages
+    history, corrections, cofactors = solution.history, solution.corrections, solution.cofactors
     position, attitude = history[-1, :3], history[-1, 3:]
     if as_published:
         # v = A d - L with the last correction d, although it has been applied already (specification, 3.2).
-        on_plate = np.einsum("nij,j->ni", course.partials, corrections[-1]) - course.residuals
+        on_plate = np.einsum("nij,j->ni", solution.partials, corrections[-1]) - solution.residuals
         scale = (grid.model[-1, 2] - position[2]) / -grid.principal_distance
         to_model = np.tile(scale * np.eye(2), (len(grid.ids), 1, 1))
         residual = scale * on_plate
     else:
-        on_plate = -course.residuals
+        on_plate = -solution.residuals
         projected, to_model = _projection(own, position, attitude)
         residual = grid.model[:, :2] - projected
-    freedom = solution.degrees_of_freedom - len(unknown)
+    freedom = core.degrees_of_freedom - len(unknown)
     order = [*REPORT_ORDER, *range(6, len(cofactors))]
     sigma0, sigma0_model = (
         math.sqrt(float((weight[:, np.newaxis] * v**2).sum() / freedom)) if freedom > 0 else None
         for v in (on_plate, residual)
     )
-    redundancy, reduced = _tests(partials, cofactors, weight, to_model, residual)
+    redundancy, reduced = _tests(solution, weight, to_model, residual)
     standardized = reduced / (sigma0 or math.nan)
     squares = float((weight[:, np.newaxis] * on_plate**2).sum())
-    observed_radius = np.hypot(*(own.plate_xy - course.residuals).T)
+    observed_radius = np.hypot(*(own.plate_xy - solution.residuals).T)
     fixed_radius = np.hypot(*own.plate_xy.T)
     result = PerspectiveCenter(
         grid=grid,
         as_published=as_published,
-        converged=course.converged,
+        converged=solution.converged,
         cycles=[
             Cycle(values[:3], correction[:3], values[3:] * MINUTES_PER_RADIAN)
             for values, correction in zip(history[1:], corrections, strict=True)
@@ -398,7 +377,7 @@ def _result(
         position=position,
         attitude=attitude,
         interior=np.array([own.principal_distance, *(grid.plate_xy - own.plate_xy)[0]]),
-        unknown=tuple(unknown),
+        unknown=unknown,
         cofactors=cofactors[np.ix_(order, order)],
         sigma0_plate=sigma0,
         sigma0_model=sigma0_model,
@@ -414,7 +393,7 @@ def _result(
         studentized=externally_studentized(reduced, squares, freedom),
         messages=messages,
     )
-    behind = [str(grid.ids[point]) for point in solution.points_behind]
+    behind = [str(grid.ids[point]) for point in core.points_behind]
     messages += hidden(len(behind), behind, [])
     if result.outliers:
         names = [
@@ -448,20 +427,14 @@ def _projection(grid: Grid, position: Floats, attitude: Floats) -> tuple[Floats,
     return projected, reach[:, np.newaxis, np.newaxis] * across
 
 
-def _tests(
-    partials: Floats,
-    cofactors: Floats,
-    weight: Floats,
-    to_model: Floats,
-    residual: Floats,
-) -> tuple[Floats, Floats]:
+def _tests(solution: _Solution, weight: Floats, to_model: Floats, residual: Floats) -> tuple[Floats, Floats]:
     """Return redundancy numbers, and standardized residuals in the model.
 
     The residuals on the plate have the cofactors P^-1 - A Q A^T. After transformation of P^-1 and of the
     cofactors to the model, the quotient of their diagonals is the visible part of an error of X or Y.
     """
-    observed = np.eye(2) / weight[:, np.newaxis, np.newaxis]
-    residuals = observed - partials @ cofactors @ partials.transpose(0, 2, 1)
+    observed, partials = np.eye(2) / weight[:, np.newaxis, np.newaxis], solution.partials
+    residuals = observed - partials @ solution.cofactors @ partials.transpose(0, 2, 1)
     turned = [to_model @ each @ to_model.transpose(0, 2, 1) for each in (residuals, observed)]
     of_residuals, of_observed = (np.diagonal(each, axis1=1, axis2=2) for each in turned)
     redundancy: Floats = of_residuals / of_observed

@@ -32,7 +32,7 @@ from photogram.stellar.pictures import night_drawings
 from photogram.stellar.places import VISION, axis_of
 
 if TYPE_CHECKING:
-    from photogram.stellar import CalibratedNight, Night
+    from photogram.stellar import CalibratedNight
 
 MAX_EXPOSURES = 200
 
@@ -75,6 +75,12 @@ def night_document(result: CalibratedNight) -> Document:
 
 def _members(result: CalibratedNight) -> dict[str, Any]:
     found, night, camera, test = result.calibration, result.night, result.camera, result.test
+    names = {"chi_square": "statistic", "degrees_of_freedom": "dimension", "own_probability": "own"}
+    standstill = result.standstill and {
+        **members(result.standstill, "probability", **names),
+        "turn_arcsec": result.standstill.turns / ARCSEC,
+        "moved": [result.names[k] for k in result.standstill.moved],
+    }
     return {
         "title": night.title,
         "conventions": conventions("night"),
@@ -92,7 +98,7 @@ def _members(result: CalibratedNight) -> dict[str, Any]:
             "term_tests": [*map(_test, result.term_tests)],
         },
         "effects": night.site.effects,
-        "standstill": _standstill(result),
+        "standstill": standstill,
         "messages": [*map(str, result.messages)],
         "covariance": {"order": camera.names, "matrix": camera.covariance},
         "correlated": correlated_members(result.correlated()),
@@ -102,19 +108,6 @@ def _members(result: CalibratedNight) -> dict[str, Any]:
 
 def _test(test: LensTest) -> dict[str, Any]:
     return {**vars(test), "verdict": test.verdict}
-
-
-def _standstill(result: CalibratedNight) -> dict[str, Any] | None:
-    test = result.standstill
-    if test is None:
-        return None
-    return {
-        **members(
-            test, "probability", chi_square="statistic", degrees_of_freedom="dimension", own_probability="own"
-        ),
-        "turn_arcsec": test.turns / ARCSEC,
-        "moved": [result.names[k] for k in test.moved],
-    }
 
 
 def _highlights(result: CalibratedNight) -> list[Fact]:
@@ -155,11 +148,7 @@ def exposures(result: CalibratedNight, most: int) -> list[Table]:
     """Return tables of exposure fit, star identification and attitudes."""
     count = len(result.names)
     some = f"The first {most} of {count}; exposures.csv has all. " if count > most else ""
-    odds = (
-        "By chance: expected number of wrong attitudes under which as many images have a star, accepted"
-        f" below {ACCEPTED:.0e}. Log odds: natural logarithm, accepted above {LOG_ODDS:.1f}. Both are absent"
-        " if the images name their stars."
-    )
+    odds = about("night.odds", accepted=ACCEPTED, log_odds=LOG_ODDS)
     name, azimuth, elevation, _, errors, *_ = _attitudes(result)
     _, ra, dec, *_ = _inertial(result)
     columns, shown = [name, azimuth, elevation, ra, dec, errors], np.arange(min(count, most))
@@ -342,6 +331,13 @@ def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:
     if (test := result.test) is not None:
         verdict, (low, high) = "fails" if test.rejected_high or test.rejected_low else "holds", test.limits
         tested = about(f"global-test.{verdict}", variance=test.variance, low=low, high=high)
+    roll = "" if night.roll_known else ", but for the roll"
+    attitudes = f"given within {math.degrees(night.attitude_error):g} degrees{roll}"
+    if night.blind is not None:
+        narrow, wide = (math.degrees(field) for field in night.blind)
+        attitudes = f"found in the whole sky, with a field of view between {narrow:g} and {wide:g} degrees"
+    elif all(exposure.stars is not None for exposure in night.exposures):
+        attitudes = "given, and the stars named"
     lens = result.camera.lens + (" (fx = fy)" if result.camera.common_scale else "")
     much = [
         Fact("Status", f"{found.status}, {found.iterations} iterations"),
@@ -349,7 +345,7 @@ def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:
         Fact.of("Stars", len(found.catalogue), note=f"{estimated} of them estimated"),
         Fact.of("Degrees of freedom", found.degrees_of_freedom),
         Fact("Lens", lens),
-        Fact("First attitudes", _first_attitudes(night)),
+        Fact("First attitudes", attitudes),
         Fact("Effects left out of places", ", ".join(night.site.effects.left_out) or "none"),
     ]
     good = [
@@ -359,13 +355,3 @@ def facts(result: CalibratedNight) -> tuple[list[Fact], list[Fact]]:
         Fact.of("Pole x, y", np.divide(night.earth.pole, ARCSEC), "arcsec", decimals=4),
     ]
     return much, good
-
-
-def _first_attitudes(night: Night) -> str:
-    if night.blind is not None:
-        low, high = (math.degrees(field) for field in night.blind)
-        return f"found in the whole sky, with a field of view between {low:g} and {high:g} degrees"
-    if all(exposure.stars is not None for exposure in night.exposures):
-        return "given, and the stars named"
-    roll = "" if night.roll_known else ", but for the roll"
-    return f"given within {math.degrees(night.attitude_error):g} degrees{roll}"

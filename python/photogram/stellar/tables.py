@@ -41,7 +41,6 @@ from photogram.stellar.problem import Counts
 if TYPE_CHECKING:
     from photogram.stellar import Result
 
-_AZIMUTHS = "Azimuths from south, positive west; elevations above the horizon."
 _NONE = np.zeros(0)
 
 
@@ -198,12 +197,7 @@ def directions(result: Result) -> Table:
         *_ellipses(found.total, "total"),
         *_ellipses(found.published, "with m_i"),
     ]
-    about = (
-        "Stars with estimated places, mean errors, and semi-axes and directions of their ellipses: from the"
-        " orientation alone, in total, and in total with m_i, the mean error of their own images."
-        f" {_AZIMUTHS}"
-    )
-    return Table("directions", "Unknown directions", columns, about=about)
+    return Table("directions", "Unknown directions", columns, about=about("plate.directions"))
 
 
 def _places(places: Floats) -> list[Quantity]:
@@ -234,7 +228,8 @@ def fictitious(result: Result) -> Table:
         *_ellipses(mean_error_ellipses(covariances, places[:, 1]), "orientation"),
         Quantity(covariances, member="covariance"),
     ]
-    return Table("fictitious_points", "Fictitious points on the diagonal", columns, about=_AZIMUTHS)
+    title = "Fictitious points on the diagonal"
+    return Table("fictitious_points", title, columns, about=about("plate.azimuths"))
 
 
 def images(result: Result) -> Table:
@@ -306,11 +301,7 @@ def distortion(result: Result) -> Table:
             column(getattr(curves, name, _NONE), UM_OF_M, name.capitalize(), 3),
             column(getattr(curves, f"{name}_error", _NONE), UM_OF_M, "Mean error", 3),
         ]
-    about = (
-        "Over the distance from its centre, with mean errors. Transformed: for the calibrated principal"
-        " distance, with which it is zero at the crossover."
-    )
-    return Table("distortion", "Distortion", columns, about=about)
+    return Table("distortion", "Distortion", columns, about=about("plate.distortion"))
 
 
 def refraction(result: Result) -> Table:

@@ -42,16 +42,6 @@ PERCENT = 100.0
 LEAST_UM = 2e-3
 
 
-@dataclass(frozen=True, eq=False)
-class Quantities:
-    """Values (k, m) of k calibrations, covariance (k, m, k, m), names and units."""
-
-    values: Floats
-    covariance: Floats
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-
-
 def common_range(records: Sequence[RecordedCalibration]) -> Frame:
     """Return the range of readings of all calibrations."""
     identities = [each.correction.identity for each in records]
@@ -60,37 +50,6 @@ def common_range(records: Sequence[RecordedCalibration]) -> Frame:
     if not (low < high).all():
         raise InputError(phrase("comparators.no-range", name=records[0].comparator))
     return Frame.of(np.array([low, high]))
-
-
-def quantities_of(
-    records: Sequence[RecordedCalibration],
-    corrections: Sequence[Correction],
-    covariance: Floats,
-    frame: Frame,
-) -> Quantities:
-    """Return comparable values of one comparator over its common range."""
-    bent = all(np.diag(each.covariance)[3:].any() for each in corrections)
-    taken, names, units = _figures(frame, bent)
-    nodes, apart = _apart(frame)
-    values, jacobians = [], []
-    for each in corrections:
-        by_parameters, _ = partials_of(each, nodes)
-        coefficients = apart @ (each.apply(nodes) - nodes)
-        values.append(taken @ coefficients.ravel())
-        jacobians.append(
-            taken @ np.einsum("tn,nap->tap", apart, by_parameters).reshape(-1, by_parameters.shape[2])
-        )
-    j = np.array(jacobians)
-    whole = np.einsum("imp,ipjq,jnq->imjn", j, covariance, j)
-    spread, variances, more = _precision(records)
-    k, m = len(records), len(names)
-    full = np.zeros((k, m + len(more), k, m + len(more)))
-    full[:, :m, :, :m] = whole
-    for column in range(len(more)):
-        full[np.arange(k), m + column, np.arange(k), m + column] = variances[:, column]
-    return Quantities(
-        np.column_stack([np.array(values), spread]), full, (*names, *more), (*units, *["percent"] * len(more))
-    )
 
 
 def _apart(frame: Frame) -> tuple[Floats, Floats]:
@@ -273,21 +232,37 @@ def _history(
     frame: Frame,
     level: float,
 ) -> History:
-    mine = [records[k] for k in own]
-    covariance = together.covariance[own][:, :, own]
-    found = quantities_of(mine, [corrections[k] for k in own], covariance, frame)
+    """Return the history of comparable values of one comparator over its common range."""
+    mine, mine_corrections = [records[k] for k in own], [corrections[k] for k in own]
+    bent = all(np.diag(each.covariance)[3:].any() for each in mine_corrections)
+    taken, names, units = _figures(frame, bent)
+    nodes, apart = _apart(frame)
+    values, jacobians = [], []
+    for each in mine_corrections:
+        by_parameters, _ = partials_of(each, nodes)
+        values.append(taken @ (apart @ (each.apply(nodes) - nodes)).ravel())
+        by_terms = np.einsum("tn,nap->tap", apart, by_parameters)
+        jacobians.append(taken @ by_terms.reshape(-1, by_parameters.shape[2]))
+    j = np.array(jacobians)
+    spread, variances, more = _precision(mine)
+    k, m, count = len(mine), len(names), len(names) + len(more)
+    covariance = np.zeros((k, count, k, count))
+    of_parameters = together.covariance[own][:, :, own]
+    covariance[:, :m, :, :m] = np.einsum("imp,ipjq,jnq->imjn", j, of_parameters, j)
+    for column in range(len(more)):
+        covariance[np.arange(k), m + column, np.arange(k), m + column] = variances[:, column]
     temperatures = [each.temperature_c for each in mine]
     known: dict[str, tuple[Floats, str]] = {}
     if None not in temperatures:
         known["temperature"] = (np.array(temperatures, dtype=float), "kelvin")
     dates = dates_of([each.day for each in mine], [each.name for each in mine])
     return history(
-        found.values,
-        found.covariance,
+        np.column_stack([np.array(values), spread]),
+        covariance,
         times=dates.years,
         occasions=dates.names,
-        names=found.names,
-        units=found.units,
+        names=(*names, *more),
+        units=(*units, *["percent"] * len(more)),
         unit_of_time="year",
         regressors=known,
         freedom=sum(each.freedom for each in records),

@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.comparator.tables import UM, XY, plate_points
 from photogram.history.document import history_document, history_findings
-from photogram.show.page import Document, Fact, Section, significant
+from photogram.show.page import Document, Fact, Section, about, significant
 from photogram.show.quantity import Axis, Quantity, Table, members, of_each
 from photogram.statistics.findings import Findings, Tested
 from photogram.words import Phrase, phrase
@@ -112,7 +112,7 @@ def comparison_document(comparison: Comparison) -> Document:
             for plate, grid in comparison.grids.items()
         ],
         more=[
-            Section("grids", "Grids", plates, GRIDS),
+            Section("grids", "Grids", plates, about("comparator.grids")),
             Section("pointing", "Pointing of the operators, all calibrations", [pointing]),
         ],
         members={
@@ -122,10 +122,3 @@ def comparison_document(comparison: Comparison) -> Document:
             "grids": grids,
         },
     )
-
-
-GRIDS = (
-    "Given coordinates and all readings of all calibrations in one adjustment, each calibration with a"
-    " comparator of its own. Absolute scale and odd shapes that look alike in grid and comparator come from"
-    " the given coordinates."
-)
