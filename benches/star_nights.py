@@ -29,7 +29,7 @@ from photogram import AdjustmentError, InputError
 from photogram.io.angles import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.matching import STRETCH
+from photogram.stellar.identification import STRETCH
 from photogram.stellar.night_calibration import calibrate_night
 from photogram.stellar.night_result import CalibratedNight, Night
 from photogram.stellar.places import apparent_places, attitude_of, sidereal_time

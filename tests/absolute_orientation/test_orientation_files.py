@@ -8,7 +8,11 @@ from orientation_models import simulate
 from message_codes import coded
 from photogram import AdjustmentError, InputError, RankError, orient
 from photogram.absolute_orientation import Similarity, Stations, read_cards, read_csv
-from photogram.absolute_orientation.cards import read_transformation, restart_record, transformation_records
+from photogram.absolute_orientation.stations import (
+    read_transformation,
+    restart_record,
+    transformation_records,
+)
 
 HEADER = "id,X,Y,Z,x,y,z\n"
 CARDS = """\

@@ -25,7 +25,7 @@ from photogram.comparator import (
 )
 from photogram.comparator.case import close_out, detect_orientation, intersect_legs, reduce_legs
 from photogram.comparator.measurements import join_least_count
-from photogram.comparator.pointing import group, group_as_listed
+from photogram.comparator.readings import group, group_as_listed
 
 
 def header(comparator=3, *, flags="10000", stage=" ", operators=(18,) * 4, master=1, date="7/17/72"):

@@ -7,7 +7,7 @@ import pytest
 from plates import QUICK, case_2, document, noisy, table
 
 from photogram.comparator import Options, calibrate
-from photogram.comparator.pointing import Ellipse, pool, pool_points, read_points
+from photogram.comparator.readings import Ellipse, pool, pool_points, read_points
 
 COLUMNS = {
     "n": (0, lambda own: own.count),
@@ -128,7 +128,7 @@ def test_feature_09_directions_of_special_ellipses(matrix, angle):
 
 
 def test_feature_09_confidence_factors():
-    from photogram.comparator.pointing import CONFIDENCE_FACTORS
+    from photogram.comparator.readings import CONFIDENCE_FACTORS
 
     for percent, factor in CONFIDENCE_FACTORS.items():
         # P(chi squared with two degrees of freedom <= factor^2) = 1 - exp(-factor^2 / 2)

@@ -13,7 +13,7 @@ from photogram.comparator import Grid, calibrate, listing, simulate_calibration
 from photogram.comparator.averages import GridSigma
 from photogram.comparator.calibration import needed_memory
 from photogram.comparator.case import locations
-from photogram.comparator.pointing import group_as_listed, read_points, rows_by_point
+from photogram.comparator.readings import group_as_listed, read_points, rows_by_point
 
 
 def plate(columns):

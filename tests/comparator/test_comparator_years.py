@@ -19,8 +19,7 @@ from photogram.comparator import (
     read_grid,
     simulate_calibration,
 )
-from photogram.comparator.years.joint import adjust_together
-from photogram.comparator.years.record import day_of
+from photogram.comparator.years.joint import adjust_together, day_of
 
 GRID = Grid.square(number=7, sigma_um=0.3)
 ERRORS = 0.3 * np.random.default_rng(1).standard_normal((25, 2))

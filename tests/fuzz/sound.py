@@ -16,7 +16,7 @@ import numpy as np
 
 from photogram import Spheroid, orient, simulate
 from photogram.absolute_orientation import read_csv
-from photogram.absolute_orientation.cards import transformation_records
+from photogram.absolute_orientation.stations import transformation_records
 from photogram.collection import simulate as simulate_collection
 from photogram.collection import to_bytes as collection_bytes
 from photogram.comparator import (

@@ -9,9 +9,9 @@ from nights import MAKER
 
 from message_codes import codes, fields_of
 from photogram.stellar import INDEX, calibrate, calibrate_exposures, calibrate_night
-from photogram.stellar.lens_choice import equal
-from photogram.stellar.lens_choice import test_scale as scale_of
-from photogram.stellar.lens_choice import test_terms as terms_of
+from photogram.stellar.comparison import equal
+from photogram.stellar.comparison import test_scale as scale_of
+from photogram.stellar.comparison import test_terms as terms_of
 from photogram.stellar.night_document import lens_tests
 
 FRAME = (6000.0, 4000.0)

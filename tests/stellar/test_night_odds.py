@@ -15,7 +15,7 @@ from photogram import InputError
 from photogram.cli import app
 from photogram.stellar import Catalogue, Exposure, calibrate_night, read_night
 from photogram.stellar.comparison import fewer_stars
-from photogram.stellar.matching import LOG_ODDS, binomial_tail, log_odds, star_probabilities
+from photogram.stellar.identification import LOG_ODDS, binomial_tail, log_odds, star_probabilities
 
 allsky = load("all_sky_camera")
 TRUTH = MAKER["CAMERA"].values

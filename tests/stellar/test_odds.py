@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from photogram.stellar.matching import ACCEPTED, Search, expected_false, match
+from photogram.stellar.identification import ACCEPTED, Search, expected_false, match
 
 NIGHTS = runpy.run_path(str(Path(__file__).parents[2] / "benches" / "star_nights.py"))
 FRAME = (6000.0, 4000.0)

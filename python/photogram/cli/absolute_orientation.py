@@ -58,15 +58,15 @@ def absolute_orientation(
         raise misuse("--trace", "requires", options="--method report or fill-in")
     from photogram import orient
     from photogram.absolute_orientation import read_cards, read_csv, read_similarity
-    from photogram.absolute_orientation.cards import (
+    from photogram.absolute_orientation.document import point_rows, without_points
+    from photogram.absolute_orientation.orientation import trace_text
+    from photogram.absolute_orientation.stations import (
         Deck,
+        is_csv,
         read_restart,
         restart_record,
         transformation_records,
     )
-    from photogram.absolute_orientation.document import point_rows, without_points
-    from photogram.absolute_orientation.orientation import trace_text
-    from photogram.absolute_orientation.stations import is_csv
     from photogram.absolute_orientation.stream import Document, decimals_for
     from photogram.messages import Message
 
@@ -143,7 +143,7 @@ def transform(
 ) -> None:
     """Transform any number of model points with an earlier orientation (part II)."""
     from photogram.absolute_orientation import read_similarity
-    from photogram.absolute_orientation.cards import read_transformation
+    from photogram.absolute_orientation.stations import read_transformation
 
     similarity = read_similarity(result, usable=True) if _is_document(result) else read_transformation(result)
     with job.outputs() as outputs:

@@ -144,7 +144,7 @@ def correct(
     and in_range (no outside the calibrated range). Points far outside are rejected.
     """
     from photogram.comparator.correction import Correction, correct_table
-    from photogram.comparator.csvfile import read_table
+    from photogram.comparator.grid import read_table
 
     made, remarks = correct_table(
         Correction.read(correction), read_table(measurements), invert=invert, extrapolate=extrapolate

@@ -32,8 +32,7 @@ from photogram.comparator.outliers import (
     problems,
     screen,
 )
-from photogram.comparator.pointing import Precision, pool_points
-from photogram.comparator.readings import Case, Session
+from photogram.comparator.readings import Case, Precision, Session, pool_points
 from photogram.comparator.variance import (
     CaseVarianceTest,
     CombinedLinear,

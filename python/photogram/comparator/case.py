@@ -11,7 +11,8 @@ from photogram.arguments.objects import require
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.fits import LEAST_POINTS
 from photogram.comparator.grid import Grid
-from photogram.comparator.pointing import (
+from photogram.comparator.readings import (
+    Case,
     PointReadings,
     Precision,
     group,
@@ -20,7 +21,6 @@ from photogram.comparator.pointing import (
     read_points,
     rows_by_point,
 )
-from photogram.comparator.readings import Case
 from photogram.errors import InputError
 from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass, replace

@@ -16,8 +16,8 @@ import orjson
 from photogram.arguments.arrays import argument_error, is_covariance, number, shaped, truth_value
 from photogram.arguments.fields import Checked, check_fields, option
 from photogram.arguments.types import Floats
-from photogram.comparator.csvfile import Table
 from photogram.comparator.fits import COUNT, Frame, Polynomial, design
+from photogram.comparator.grid import Table
 from photogram.comparator.readings import LARGEST_UM, Session
 from photogram.errors import InputError
 from photogram.io import json

@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram.comparator.joint import JointFit
 from photogram.comparator.pictures import plotters
-from photogram.comparator.pointing import Precision
+from photogram.comparator.readings import Precision
 from photogram.comparator.tables import (
     LINEAR,
     cases,

@@ -1,7 +1,13 @@
-"""Fits of one case: rigid (FIDFIT2) and linear, with their residuals.
+"""Fits of one case: rigid (FIDFIT2), linear, and polynomials, with their residuals.
 
 A general linear transformation is decomposed into two scales, lack of orthogonality and rotation. The
 decomposition is exact (NOAA TR NOS 57, equations 33 to 38, 46, 47 and 54).
+
+Correction polynomials of degree four without cross terms (NOAA TR NOS 57, equations 59 to 62).
+
+P = A x^4 + B y^4 + C x^3 + D y^3 + E x^2 + F y^2 + G x + H y + J, for x and for y. Arguments are shifted and
+scaled to -1 ... 1. The condition is 8e9 for normal equations in metres, and a few tens for QR on the scaled
+columns.
 """
 
 from __future__ import annotations

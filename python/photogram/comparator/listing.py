@@ -16,7 +16,7 @@ from photogram.comparator.case import Closeout, exchanged
 from photogram.comparator.correction import Correction
 from photogram.comparator.fits import TERMS, Decomposition, Polynomial, Residuals
 from photogram.comparator.grid import Grid
-from photogram.comparator.pointing import Precision
+from photogram.comparator.readings import Precision
 from photogram.comparator.tables import linear, variance
 from photogram.comparator.variance import CombinedPolynomial, SinglePolynomial
 from photogram.io.angles import ARCSEC, degrees_minutes_seconds

@@ -15,8 +15,18 @@ from typing import Any
 import numpy as np
 
 from photogram.arguments.objects import path_of, require
-from photogram.comparator.csvfile import Keys, Table, read_table, settings_lines, switch, text_of
-from photogram.comparator.grid import BUILT_IN, Grid, built_in_grid, find_grid
+from photogram.comparator.grid import (
+    BUILT_IN,
+    Grid,
+    Keys,
+    Table,
+    built_in_grid,
+    find_grid,
+    read_table,
+    settings_lines,
+    switch,
+    text_of,
+)
 from photogram.comparator.readings import LARGEST_UM, Reading, Session, collect_cases
 from photogram.errors import InputError
 from photogram.io.numbers import is_whole_number

@@ -11,7 +11,7 @@ import numpy as np
 
 from photogram.comparator.case import exchanged
 from photogram.comparator.listing import table_nodes
-from photogram.comparator.pointing import CONFIDENCE_FACTORS
+from photogram.comparator.readings import CONFIDENCE_FACTORS
 from photogram.errors import InputError
 from photogram.plots.picture_data import VectorField
 from photogram.plots.residuals import vector_panel
@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from photogram.arguments.types import Floats
     from photogram.comparator import Calibration
     from photogram.comparator.fits import Polynomial
-    from photogram.comparator.pointing import Precision
+    from photogram.comparator.readings import Precision
 
 __all__ = ["sketches"]
 

@@ -1,4 +1,4 @@
-"""Analysis of variance (NOAA TR NOS 57, equations 66 to 68, figure 30), and tests of significance."""
+"""Combined solution of all cases, analysis of variance, and tests (NOAA TR NOS 57)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from photogram.comparator.fits import (
     fit_rigid,
     rotation_matrix,
 )
-from photogram.comparator.pointing import Precision
+from photogram.comparator.readings import Precision
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.statistics.distributions import critical_chi_square, log_chi_square, log_fisher
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
+from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
 from photogram.stellar.findings import plate_tests
 from photogram.stellar.iteration import DIVERGED, PreRun, Solved, iterate, iterate_as_published

@@ -1,4 +1,4 @@
-"""Curves of distortion and refraction, residuals, comparator axes (NOAA TR NOS 55, eq. 35 to 87)."""
+"""Curves of distortion and refraction, residuals, unknown directions, axes (NOAA TR NOS 55)."""
 
 from __future__ import annotations
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.io.angles import ARCSEC
+from photogram.lazy_dataclasses import replace
 from photogram.show.judgement import remarks_section, verdict_document, verdict_table
 from photogram.show.page import (
     Document,
@@ -24,6 +24,7 @@ from photogram.show.page import (
 from photogram.show.quantity import Table, members
 from photogram.stellar import tables
 from photogram.stellar.camera_tables import UM_OF_M, correlated_members, matrix_table, worst_table
+from photogram.stellar.comparison import TERM_LEVEL, equal
 from photogram.stellar.curves import (
     comparator_frame,
     distortion_curves,
@@ -32,7 +33,6 @@ from photogram.stellar.curves import (
     residual_classes,
 )
 from photogram.stellar.findings import plate_tests
-from photogram.stellar.lens_choice import LEVEL, equal
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX
 from photogram.stellar.pictures import plate_drawings
 from photogram.stellar.printout import descriptors, have_common_weight
@@ -207,8 +207,8 @@ def _good(result: Result) -> list[Fact]:
     pair, freedom, scales = [INDEX["cx"], INDEX["cy"]], result.degrees_of_freedom, about("scales.none")
     if result.solved.free[pair].all() and freedom:
         f, p = equal(result.solved.parameters[pair], result.covariance[np.ix_(pair, pair)], freedom)
-        code = f"scales.{'refused' if p < LEVEL else 'kept'}"
-        scales = about(code, f=f, freedom=freedom, p=p, level=LEVEL)
+        code = f"scales.{'refused' if p < TERM_LEVEL else 'kept'}"
+        scales = about(code, f=f, freedom=freedom, p=p, level=TERM_LEVEL)
     return [
         Fact.of("Mean error of unit weight, computed", 1e6 * result.computed_mean_error, "µm", figures=9),
         Fact.of("Mean error of unit weight, in use", 1e6 * result.mean_error, "µm", _UNIT, figures=9),

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.stellar.iteration import Solved, iterate, residual_cycle
 from photogram.stellar.parameters import GROUPS, NAMES
 from photogram.stellar.problem import Problem, core_problem

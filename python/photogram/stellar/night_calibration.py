@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -17,12 +16,12 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError, PhotogramError, message_of
 from photogram.io.angles import ARCSEC
+from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
 from photogram.statistics.weight_rules import LARGEST_FACTOR
 from photogram.stellar.camera_tables import correlation_remarks
-from photogram.stellar.comparison import stood_still
+from photogram.stellar.comparison import POSITIVE, LensFit, LensTest, stood_still, test_scale, test_terms
 from photogram.stellar.identification import attitude_of_stars, has_named_stars
-from photogram.stellar.lens_choice import POSITIVE, LensFit, LensTest, test_scale, test_terms
 from photogram.stellar.night_result import CalibratedNight, Night
 from photogram.stellar.night_run import Run, adjusted
 from photogram.stellar.places import Earth, station_attitude

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from photogram.io.angles import ARCSEC
+from photogram.lazy_dataclasses import replace
 from photogram.show.judgement import remarks_section, verdict_document, verdict_table
 from photogram.show.page import Document, Fact, Facts, Layers, Section, about, conventions
 from photogram.show.quantity import Axis, Quantities, Quantity, Table, chosen, members, of_each
@@ -25,9 +25,9 @@ from photogram.stellar.camera_tables import (
     parameter_table,
     worst_table,
 )
+from photogram.stellar.comparison import DECISIVE, POSITIVE, LensTest
 from photogram.stellar.findings import night_tests
-from photogram.stellar.lens_choice import DECISIVE, POSITIVE, LensTest
-from photogram.stellar.matching import ACCEPTED, LOG_ODDS
+from photogram.stellar.identification import ACCEPTED, LOG_ODDS
 from photogram.stellar.pictures import night_drawings
 from photogram.stellar.places import VISION, axis_of
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Set
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +16,10 @@ from photogram.io.angles import ARCSEC
 from photogram.io.delimited import read_records, renaming
 from photogram.io.places import Place, at_place
 from photogram.io.toml import TomlTree, read_document
+from photogram.lazy_dataclasses import replace
 from photogram.messages import unknown_name
 from photogram.stellar.catalogue import Catalogue, star_key
-from photogram.stellar.identification import STARS_OF_AN_ATTITUDE
-from photogram.stellar.matching import STRETCH
+from photogram.stellar.identification import STARS_OF_AN_ATTITUDE, STRETCH
 from photogram.stellar.night_result import Night
 from photogram.stellar.parameters import GRAD
 from photogram.stellar.places import Earth, attitude_of, axis_of, epoch, pointing_matrix, station_attitude

@@ -19,7 +19,7 @@ from photogram.show.methods import Documented, Judged
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.stellar.camera_tables import correlated, significance
 from photogram.stellar.catalogue import Catalogue
-from photogram.stellar.matching import STRETCH
+from photogram.stellar.identification import STRETCH
 from photogram.stellar.places import Earth, inertial_attitudes
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, SkyCalibration
@@ -30,8 +30,7 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
-    from photogram.stellar.comparison import Standstill
-    from photogram.stellar.lens_choice import LensFit, LensTest
+    from photogram.stellar.comparison import LensFit, LensTest, Standstill
     from photogram.stellar.pictures import PicturedStars
 
 

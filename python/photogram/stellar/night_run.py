@@ -15,22 +15,20 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.neighbours import mutually_nearest
 from photogram.stellar.comparison import LEVEL, NOTABLE, fewer_stars, held_out
 from photogram.stellar.identification import (
-    STARS_OF_AN_ATTITUDE,
-    attitude_radius,
-    identify,
-    sky_share,
-    stars_near,
-)
-from photogram.stellar.matching import (
     ACCEPTED,
     CERTAIN,
     DOUBTFUL,
     LOG_ODDS,
+    STARS_OF_AN_ATTITUDE,
     STRETCH,
     Match,
+    attitude_radius,
     expected_false,
+    identify,
     log_odds,
+    sky_share,
     star_probabilities,
+    stars_near,
 )
 from photogram.stellar.night_result import Night
 from photogram.stellar.places import (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -11,7 +10,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools
 from photogram.io.angles import ARCSEC
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.plots.accessor import drawings
 from photogram.plots.picture_data import Correlated, Curve, Curves, Images
 from photogram.show.page import Drawing, Layers

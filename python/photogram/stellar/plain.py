@@ -1,10 +1,9 @@
-"""Plain form of a plate calibration: options in TOML, stars and images in CSV (`docs/stellar-camera.md`)."""
+"""Plates in TOML and CSV files, and parts that nights share (`docs/stellar-camera.md`)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence, Set
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,7 +17,7 @@ from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_records
 from photogram.io.places import Place, at_place
 from photogram.io.toml import TomlTree, read_document, read_toml
-from photogram.lazy_dataclasses import fields
+from photogram.lazy_dataclasses import fields, replace
 from photogram.stellar.cameras import PlateCamera
 from photogram.stellar.catalogue import star_key
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX, NAMES, UNITS

@@ -1,4 +1,4 @@
-"""Input of a plate calibration: stars, images, weights, counts, rejected observations."""
+"""Input of a plate calibration: options, stars, images, weights, counts, rejected observations."""
 
 from __future__ import annotations
 

@@ -22,8 +22,7 @@ from photogram.comparator.calibration import Calibration
 from photogram.comparator.correction import Correction, partials_of
 from photogram.comparator.fits import Frame, Polynomial
 from photogram.comparator.grid import Grid, with_corrections
-from photogram.comparator.years.joint import Together, adjust_together
-from photogram.comparator.years.record import RecordedCalibration
+from photogram.comparator.years.joint import RecordedCalibration, Together, adjust_together
 from photogram.errors import InputError
 from photogram.history.changes import History, dates_of, history
 from photogram.lazy_dataclasses import dataclass
