@@ -131,16 +131,17 @@ def orient(
     rows = np.flatnonzero(used.any(axis=1))
     control = np.where(used, stations.control, np.nan)[rows]
 
+    common: dict[str, Any] = {"max_iterations": max_iterations, "tolerance": tolerance, "threads": 0}
+    if scale is not None:
+        common["scale"] = scale
+
     def solve(control: Floats, **options: Any) -> _photocore.SimilaritySolution:
         return _photocore.orient_model(
             control,
             np.where(used, stations.control_sd, np.inf)[rows],
             stations.model[rows],
             np.ones((len(rows), 3)) if stations.model_sd is None else stations.model_sd[rows],
-            **{"max_iterations": max_iterations, "former": None, "trace": False, **options},
-            **({} if scale is None else {"scale": scale}),
-            tolerance=tolerance,
-            threads=0,
+            **{"former": None, "trace": False, **common, **options},
         )
 
     known = former.similarity if isinstance(former, Orientation) else former

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 import orjson
@@ -230,11 +230,14 @@ def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
         found = orjson.loads(read_bytes(path))
         is_refused, centres = usable and not found["usable"], found["centres"]
         reasons = ([*map(str, found["messages"])] or [found["status"]]) if is_refused else []
+        covariance = found["covariance"]
+        if covariance is not None and any(value is None for row in covariance for value in row):
+            covariance = None  # An unknown element
         similarity = Similarity.from_parameters(
             found["scale"],
             found["rotation"],
             found["translation"],
-            _known(found["covariance"]),
+            covariance,
             control_centre=centres["control"],
             model_centre=centres["model"],
             deviation_factor=found["deviation_factor"],
@@ -242,10 +245,3 @@ def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
     if is_refused:
         raise InputError(phrase("orientation.unusable", reasons=reasons), file=path)
     return similarity
-
-
-def _known(covariance: list[list[Any]] | None) -> list[list[Any]] | None:
-    """Return a covariance; None if any element is unknown."""
-    if covariance is None or any(value is None for row in covariance for value in row):
-        return None
-    return covariance

@@ -166,11 +166,7 @@ def is_csv(path: Path) -> bool:
 
 def header(place: Place) -> list[str]:
     """Return the column names of a record, in the spelling X, Y, Z, x, y, z."""
-    return [spelling(cell) for cell in cells(place)]
-
-
-def spelling(name: str) -> str:
-    return SPELLINGS.get(name, name)
+    return [SPELLINGS.get(cell, cell) for cell in cells(place)]
 
 
 def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = "model unit") -> Stations:
@@ -187,7 +183,7 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
         contains file, record and text.
     """
     path = path_of("path", path)
-    table = read_records(path, spelling=lambda names: [spelling(name) for name in names])
+    table = read_records(path, spelling=lambda names: [SPELLINGS.get(name, name) for name in names])
     allowed = (*REQUIRED, *OPTIONAL)
     table.require(*REQUIRED)
     if unknown := [name for name in table.columns if name not in allowed]:

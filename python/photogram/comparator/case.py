@@ -207,7 +207,11 @@ def place_case(case: Case, grid: Grid, *, as_published: bool = False) -> tuple[P
         place = reduced.places[int(np.flatnonzero(reduced.points == equal[1])[0])]
         fields = {"case": reduced.number, "first": equal[0], "second": equal[1]}
         raise place.error(phrase("comparators.equal-points", **fields))
-    messages += _identical(reduced, readings)
+    # Points with several identical readings, possibly copies
+    if identical := [reading.point for reading in readings if reading.identical]:
+        place = reduced.places[int(np.flatnonzero(reduced.points == identical[0])[0])]
+        copied = {"case": reduced.number, "points": ", ".join(map(str, identical))}
+        messages.append(place.message(phrase("comparators.identical", **copied)))
     with at_place(case.place, name):
         orientation = detect_orientation(grid, points, means)
     placed = PlacedCase(
@@ -225,16 +229,6 @@ def place_case(case: Case, grid: Grid, *, as_published: bool = False) -> tuple[P
         scale = float(extent / spread)
         raise case.place.error(phrase("comparators.scale", case=case.number, scale=scale))
     return placed, messages
-
-
-def _identical(case: Case, readings: list[PointReadings]) -> list[Message]:
-    """Warn about points with several identical readings, possibly copies."""
-    points = [reading.point for reading in readings if reading.identical]
-    if not points:
-        return []
-    place = case.places[int(np.flatnonzero(case.points == points[0])[0])]
-    names = ", ".join(map(str, points))
-    return [place.message(phrase("comparators.identical", case=case.number, points=names))]
 
 
 SUSPECT_UM, REMEASURE_UM = 2.0, 4.0  # mean shifts: check the second point, measure the case again

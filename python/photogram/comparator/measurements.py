@@ -177,8 +177,13 @@ class _Deck:
                 messages.append(card.message(phrase("comparators.zero-readings", point=reading.point)))
             else:
                 readings.append(reading)
-        more = {"range_centre_um": self.centre_um, "messages": messages}
-        session = replace(self.header, cases=collect_cases(readings), grids=self.grids, **more)
+        session = replace(
+            self.header,
+            cases=collect_cases(readings),
+            grids=self.grids,
+            range_centre_um=self.centre_um,
+            messages=messages,
+        )
         if not session.cases:
             raise self.first.error(phrase("comparators.empty-deck"))
         session.check()

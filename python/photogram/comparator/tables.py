@@ -125,7 +125,8 @@ def _powers(names: Sequence[str]) -> Quantity:
 def cases(calibration: Calibration) -> Table:
     found, last, combined = calibration.cases, calibration.last_fits, calibration.linear.cases
     heads = {"free": "Unit weight, free", "linear": "after linear", "nonlinear": "after polynomials"}
-    stages, alone, together = [], [], []
+    stages, alone, together, lines, closeouts = [], [], [], [], []
+    of_closeout = ("point", "sequential_shifts_um", "total_shift_um", "verdict")
     for case, one, two in zip(found, combined, last, strict=True):
         own = {"free": case.free.residuals, "linear": case.linear.residuals}
         if case.polynomial:
@@ -135,6 +136,9 @@ def cases(calibration: Calibration) -> Table:
         together.append({"linear": one.residuals.sigma0_um, "nonlinear": of_last})
         own |= {"combined_linear": one.residuals, "combined_last": two.residuals}
         stages.append({name: _residuals(residuals) for name, residuals in own.items()})
+        line = members(case.linear, "translation_um", "covariance")
+        lines.append(members(case.linear.parameters, *LINEAR, "rotation_rad") | line)
+        closeouts.append([members(each, *of_closeout, pointings="counts") for each in case.closeouts])
     columns = [
         of_each(found, "number", kind="name", member="case", head="Case"),
         of_each(found, "placed.case.plate", kind="name", member="plate", head="Plate"),
@@ -164,9 +168,9 @@ def cases(calibration: Calibration) -> Table:
         Quantity(alone, member="sigma0_um"),
         Quantity(together, member="sigma0_combined_um"),
         Quantity(stages, member="stages"),
-        Quantity([_linear(case) for case in found], member="linear"),
+        Quantity(lines, member="linear"),
         Quantity([_polynomial(case) for case in found], member="polynomial"),
-        Quantity([_closeouts(case) for case in found], member="closeouts"),
+        Quantity(closeouts, member="closeouts"),
     ]
     note, test = "", calibration.case_test
     if test is not None and test.f_max_limit is not None:
@@ -183,21 +187,11 @@ def _residuals(found: Residuals) -> dict[str, object]:
     return members(found, "comparator_um", "grid_um", "sigma_um", sum_vv_um2="squares_um2")
 
 
-def _linear(case: CaseResult) -> dict[str, object]:
-    own = members(case.linear.parameters, *LINEAR, "rotation_rad")
-    return own | members(case.linear, "translation_um", "covariance")
-
-
 def _polynomial(case: CaseResult) -> dict[str, object] | None:
     if case.polynomial is None:
         return None
     x, y = case.polynomial.polynomial.coefficients
     return {"coefficients_x": x, "coefficients_y": y, "covariance": case.polynomial.covariance}
-
-
-def _closeouts(case: CaseResult) -> list[dict[str, object]]:
-    names = ("point", "sequential_shifts_um", "total_shift_um", "verdict")
-    return [members(each, *names, pointings="counts") for each in case.closeouts]
 
 
 def outliers(screening: Screening) -> Table:

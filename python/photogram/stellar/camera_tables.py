@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
 from photogram.io.angles import ARCSEC
+from photogram.lazy_dataclasses import replace
 from photogram.show.quantity import Axis, Kind, Quantity, Table, component
 from photogram.stellar.parameters import GRAD
 from photogram.words import Phrase, phrase
@@ -97,29 +98,21 @@ def parameter_table(
     `given` are (2, n) prior values and mean errors, infinite if free and 0 if fixed. `ratios` contains terms
     over their mean errors by name, `more` additional columns.
     """
-    of = np.arange(len(axes))
-    before = []
+    of, before = np.arange(len(axes)), []
+    value = Quantity(values, axes, "difference", "value", "value", head="Value", figures=9, of=of)
+    deviation = Quantity(errors, axes, "deviation", words={0.0: "fixed"}, of=of)
     if given is not None:
         words = {0.0: "fixed", np.inf: "free"}
         before = [
-            Quantity(given[0], axes, "difference", head="Given", figures=9, of=of),
-            Quantity(given[1], axes, "deviation", head="Mean error before", words=words, of=of),
+            replace(value, values=given[0], name=None, member="", head="Given"),
+            replace(deviation, values=given[1], head="Mean error before", words=words),
         ]
     columns = [
         Quantity([axis.name for axis in axes], kind="name", name="parameter"),
         component(axes, of)[0],
         *before,
-        Quantity(values, axes, "difference", "value", "value", head="Value", figures=9, of=of),
-        Quantity(
-            errors,
-            axes,
-            "deviation",
-            "mean_error",
-            "mean_error",
-            head="Mean error",
-            words={0.0: "fixed"},
-            of=of,
-        ),
+        value,
+        replace(deviation, values=errors, name="mean_error", member="mean_error", head="Mean error"),
         Quantity([ratios.get(axis.name, np.nan) for axis in axes], head="Over its mean error", decimals=1),
         Quantity([axis.unit for axis in axes], kind="name", name="unit", member="unit"),
         *more,

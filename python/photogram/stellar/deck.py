@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -28,20 +29,18 @@ class Card(Record):
 
     def real(self, first: int, last: int, decimals: int = 8) -> float:
         """Return an Ew.d or Fw.d field; blank is zero."""
-        try:
-            return float(parse_real(self.columns(first, last), decimals))
-        except ValueError as error:
-            raise self._error(first, last, error) from None
+        return float(self._parsed(first, last, partial(parse_real, decimals=decimals)))
 
     def integer(self, first: int, last: int) -> int:
         """Return an Iw field; blank is zero."""
-        try:
-            return parse_integer(self.columns(first, last))
-        except ValueError as error:
-            raise self._error(first, last, error) from None
+        return int(self._parsed(first, last, parse_integer))
 
-    def _error(self, first: int, last: int, error: ValueError) -> InputError:
-        return self.error(phrase("error.columns", first=first, last=last, message=message_of(error)))
+    def _parsed(self, first: int, last: int, parse: Callable[[str], Any]) -> Any:
+        try:
+            return parse(self.columns(first, last))
+        except ValueError as error:
+            message = phrase("error.columns", first=first, last=last, message=message_of(error))
+            raise self.error(message) from None
 
     def reals(self, first: int, width: int, count: int, decimals: int = 8) -> list[float]:
         starts = range(first, first + width * count, width)

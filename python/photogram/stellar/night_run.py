@@ -360,7 +360,7 @@ def find_hint(night: Night, unidentified: Sequence[int]) -> tuple[Phrase, tuple[
     Unidentified exposures with the most images are tested. None if all tested mistakes fail.
     """
     order = sorted(unidentified, key=lambda index: -len(night.exposures[index].xy))[:_MAX_EXPOSURES]
-    mistakes = [*_mistakes(night.site), *(_roll_mistakes() if night.roll_known else ())]
+    mistakes = [*_mistakes(night.site, roll_known=night.roll_known)]
     best: tuple[int, float] = (0, 0.0)
     hint = None
     for mistake in mistakes:
@@ -379,8 +379,8 @@ def find_hint(night: Night, unidentified: Sequence[int]) -> tuple[Phrase, tuple[
     return hint
 
 
-def _mistakes(site: Site) -> Iterator[_Mistake]:
-    """Yield mistakes of images, angles, station, fields of view and clocks.
+def _mistakes(site: Site, *, roll_known: bool) -> Iterator[_Mistake]:
+    """Yield mistakes of images, angles, station, fields of view, clocks, and a known roll.
 
     Clocks may show the zone time of the longitude, summer time, or an hour more or less. The sky some hours
     later is the sky of a station farther east by the same rotation.
@@ -402,11 +402,9 @@ def _mistakes(site: Site) -> Iterator[_Mistake]:
     for hours in sorted({-1, 1, -zone, -zone - 1} - {0}):
         later = {"longitude_west": west - hours * _HOUR}
         yield _Mistake(phrase("stars.hint.utc", hours=hours), site=later)
-
-
-def _roll_mistakes() -> Iterator[_Mistake]:
-    yield _Mistake(phrase("stars.hint.roll-sign"), angles=lambda a, e, r: (a, e, -r))
-    for turn in (90, 180, -90):
+    if roll_known:
+        yield _Mistake(phrase("stars.hint.roll-sign"), angles=lambda a, e, r: (a, e, -r))
+    for turn in (90, 180, -90) if roll_known else ():
         yield _Mistake(phrase("stars.hint.roll", turn=turn), angles=partial(_rolled, turn=math.radians(turn)))
 
 

@@ -203,12 +203,11 @@ VISION = np.outer([1.0, -1.0, -1.0], [1.0, -1.0, -1.0])
 
 
 def inertial_attitudes(
-    angles: Floats, covariances: Floats, site: Site, utcs: Sequence[str], earth: Earth | None = None
+    angles: Floats, covariances: Floats, site: Site, utcs: Sequence[str], earth: Earth
 ) -> Attitudes:
     """Return attitudes in ICRS from alpha, omega, kappa (E, 3) with covariances (E, 3, 3).
 
-    Angles and station refer to the mean pole; without `earth` UT1 - UTC and the pole are zero. Aberration and
-    refraction are ignored.
+    Angles and station refer to the mean pole. Aberration and refraction are ignored.
 
     Notes
     -----
@@ -216,7 +215,6 @@ def inertial_attitudes(
     angle and declination, apparent sidereal time the true equator and equinox. The transposed matrix of bias,
     precession and nutation (IAU 2006/2000A) rotates to ICRS.
     """
-    earth = earth or Earth()
     place = earth.site_of_date(site)
     to_date_pole = terrestrial(place).T @ pole_matrix(earth.pole).T @ terrestrial(site)
     matrices, steps = [], []
@@ -229,12 +227,11 @@ def inertial_attitudes(
     return Attitudes.of("matrix_to_vision", np.array(matrices), np.array(steps))
 
 
-def station_attitude(matrix: Floats, site: Site, utc: str, earth: Earth | None = None) -> Floats:
+def station_attitude(matrix: Floats, site: Site, utc: str, earth: Earth) -> Floats:
     """Return alpha, omega, kappa at a station from a rotation matrix (ICRS to camera).
 
     Camera axes are x right, y down, z along the axis. Aberration and refraction are ignored.
     """
-    earth = earth or Earth()
     place = earth.site_of_date(site)
     local = equatorial_axes(place.latitude, sidereal_time(place, utc, earth.dut1))
     return _photocore.pointing_of_matrix(np.ascontiguousarray(matrix @ to_date(utc).T @ local))

@@ -203,8 +203,12 @@ def _coordinates(result: Result) -> Iterator[str]:
             f"{'NUMBER':<9}{'ATION':<9}" + 2 * f"{'LX':<12}{'LY':<12}" + f"{'CORR.':<12}{'':<20}{'LX':<12}LY"
         )
         yield from (_image(result, image) for image in np.flatnonzero(problem.image_stars == star).tolist())
-        if problem.star_ids[star] in means:
-            yield from _mean(problem.star_ids[star], *means[problem.star_ids[star]])
+        if (mean := means.get(problem.star_ids[star])) is not None:
+            heads = f"{'MEAN PLATE COORDINATES':<38}{'MEAN RESIDUALS (MICRONS)':<36}RADIAL AND TANGENTIAL"
+            yield f"{'STAR':<9}{heads}"
+            yield f"{'NUMBER':<9}{'LX':<19}{'LY':<19}{'LX':<18}{'LY':<18}"
+            micrometres = "".join(f"{1e6 * value:<18.3f}" for value in (*mean[1], *mean[2]))
+            yield f"{problem.star_ids[star]:<9}{_row(mean[0], 19)}{micrometres}"
 
 
 def _image(result: Result, image: int) -> str:
@@ -217,13 +221,6 @@ def _image(result: Result, image: int) -> str:
         f"{problem.image_points[image]:<9}{GROUPS[problem.image_groups[image]].upper():<9}"
         f"{x:<12.5f}{y:<12.5f}{weights}{hours:3d} {minutes:2d} {seconds:7.4f}     {vx:<12.3f}{vy:.3f}"
     )
-
-
-def _mean(star: str, mean: Floats, residual: Floats, parts: tuple[float, float]) -> Iterator[str]:
-    yield f"{'STAR':<9}{'MEAN PLATE COORDINATES':<38}{'MEAN RESIDUALS (MICRONS)':<36}RADIAL AND TANGENTIAL"
-    yield f"{'NUMBER':<9}{'LX':<19}{'LY':<19}{'LX':<18}{'LY':<18}"
-    micrometres = "".join(f"{1e6 * value:<18.3f}" for value in (*residual, *parts))
-    yield f"{star:<9}{_row(mean, 19)}{micrometres}"
 
 
 def _row(values: Sequence[float] | Floats, width: int) -> str:
