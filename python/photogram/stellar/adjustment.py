@@ -12,7 +12,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
-from photogram.stellar.findings import plate_tests
+from photogram.stellar.camera_tables import plate_tests
 from photogram.stellar.iteration import DIVERGED, PreRun, Solved, iterate, iterate_as_published
 from photogram.stellar.movement import combine, movement, pairs_to_combine
 from photogram.stellar.parameters import GROUPS, INDEX, NAMES

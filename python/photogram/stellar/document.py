@@ -23,7 +23,13 @@ from photogram.show.page import (
 )
 from photogram.show.quantity import Table, members
 from photogram.stellar import tables
-from photogram.stellar.camera_tables import UM_OF_M, correlated_members, matrix_table, worst_table
+from photogram.stellar.camera_tables import (
+    UM_OF_M,
+    correlated_members,
+    matrix_table,
+    plate_tests,
+    worst_table,
+)
 from photogram.stellar.comparison import TERM_LEVEL, equal
 from photogram.stellar.curves import (
     comparator_frame,
@@ -32,7 +38,6 @@ from photogram.stellar.curves import (
     refraction_curves,
     residual_classes,
 )
-from photogram.stellar.findings import plate_tests
 from photogram.stellar.parameters import GRAD, GROUPS, INDEX
 from photogram.stellar.pictures import plate_drawings
 from photogram.stellar.printout import descriptors, have_common_weight

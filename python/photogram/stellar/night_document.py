@@ -22,11 +22,11 @@ from photogram.stellar.camera_tables import (
     correlations,
     matrix_table,
     names_column,
+    night_tests,
     parameter_table,
     worst_table,
 )
 from photogram.stellar.comparison import DECISIVE, POSITIVE, LensTest
-from photogram.stellar.findings import night_tests
 from photogram.stellar.identification import ACCEPTED, LOG_ODDS
 from photogram.stellar.pictures import night_drawings
 from photogram.stellar.places import VISION, axis_of

@@ -17,7 +17,7 @@ from photogram.messages import Message, unknown_name
 from photogram.network.attitudes import Attitudes
 from photogram.show.methods import Documented, Judged
 from photogram.statistics.limits import GlobalTest, global_test
-from photogram.stellar.camera_tables import correlated, significance
+from photogram.stellar.camera_tables import correlated, night_findings, significance
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.identification import STRETCH
 from photogram.stellar.places import Earth, inertial_attitudes
@@ -244,8 +244,6 @@ class CalibratedNight(Judged, Documented):
         return night_pictured(self)
 
     def _findings(self) -> Findings:
-        from photogram.stellar.findings import night_findings
-
         return night_findings(self)
 
     def correlated(self) -> list[tuple[str, str, float]]:

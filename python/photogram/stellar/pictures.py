@@ -18,9 +18,8 @@ from photogram.show.sketch.marks import Line, Mark, Panel, band, horizontal_line
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import COLOURS, FAINT
 from photogram.statistics.findings import Tested
-from photogram.stellar.camera_tables import correlations
+from photogram.stellar.camera_tables import correlations, night_standardized, plate_standardized
 from photogram.stellar.curves import distortion_curves, refraction_curves
-from photogram.stellar.findings import night_standardized, plate_standardized
 from photogram.stellar.parameters import GROUPS
 
 if TYPE_CHECKING:

@@ -279,7 +279,7 @@ class Problem(Brief):
             self.options.camera_kind,
             parameters,
             fixed,
-            prior=Prior(
+            prior=(
                 weighted,
                 self.initial[weighted],
                 self.parameter_weights[np.ix_(weighted, weighted)],
@@ -300,26 +300,9 @@ class Problem(Brief):
         )
 
 
-@dataclass(frozen=True, eq=False)
-class Prior:
-    """Weighted parameters of the core: (k,) rows, values, (k, k) weights, names."""
-
-    rows: Indices
-    values: Floats
-    weights: Floats
-    names: Sequence[str]
-
-    def root(self) -> Floats:
-        """Return R of P = R^T R, computed with scaled P since parameter units differ."""
-        scale = np.sqrt(np.diag(self.weights))
-        try:
-            lower = np.linalg.cholesky(self.weights / np.outer(scale, scale))
-        except np.linalg.LinAlgError:
-            raise InputError(phrase("stars.indefinite", names=self.names)) from None
-        return np.ascontiguousarray(lower.T * scale)
-
-
-NO_PRIOR = Prior(np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 0)), [])
+Prior = tuple[Indices, Floats, Floats, Sequence[str]]
+"""Weighted parameters of the core: (k,) rows, values, (k, k) weights, names."""
+NO_PRIOR: Prior = np.zeros(0, np.int64), np.zeros(0), np.zeros((0, 0)), []
 
 
 def core_problem(
@@ -342,16 +325,22 @@ def core_problem(
     axis: tuple[int, tuple[float, float], list[float], list[list[float]]] | None = None,
 ) -> _photocore.StellarProblem:
     """Return a problem of the core with three values per attitude and 17 common ones."""
-    attitudes = len(values) - len(COMMON)
+    attitudes, (rows, prior_values, weights, names) = len(values) - len(COMMON), prior
+    # Weights are scaled for P = R^T R, since parameter units differ.
+    scale = np.sqrt(np.diag(weights))
+    try:
+        lower = np.linalg.cholesky(weights / np.outer(scale, scale))
+    except np.linalg.LinAlgError:
+        raise InputError(phrase("stars.indefinite", names=names)) from None
     return _photocore.StellarProblem(
         station=site.core,
         camera=camera,
         pointings=values[:attitudes].reshape(-1, 3),
         common=values[attitudes:],
         fixed=fixed.tolist(),
-        weighted=prior.rows,
-        weighted_values=prior.values,
-        weight_root=prior.root(),
+        weighted=rows,
+        weighted_values=prior_values,
+        weight_root=np.ascontiguousarray(lower.T * scale),
         star_places=places,
         star_catalogue=places if catalogue is None else catalogue,
         star_weights=star_weights,

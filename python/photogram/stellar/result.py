@@ -15,7 +15,13 @@ from photogram.messages import Message
 from photogram.network.cameras import Camera
 from photogram.show.methods import Documented, Judged
 from photogram.statistics.limits import GlobalTest, global_test
-from photogram.stellar.camera_tables import correlated, correlation_remarks, correlations, significance
+from photogram.stellar.camera_tables import (
+    correlated,
+    correlation_remarks,
+    correlations,
+    plate_findings,
+    significance,
+)
 from photogram.stellar.cameras import PlateCamera
 from photogram.stellar.curves import Directions, directions, mean_error_ellipses
 from photogram.stellar.iteration import PreRun, Solved
@@ -208,8 +214,6 @@ class Result(Judged, Documented):
         return plate_pictured(self)
 
     def _findings(self) -> Findings:
-        from photogram.stellar.findings import plate_findings
-
         return plate_findings(self)
 
     def correlated(self) -> list[tuple[str, str, float]]:

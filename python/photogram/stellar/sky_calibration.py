@@ -23,7 +23,7 @@ from photogram.memory import available_memory
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.parameters import COMMON
 from photogram.stellar.places import Earth, apparent_places, epoch, sidereal_time, transformed_angles
-from photogram.stellar.problem import NO_PRIOR, Prior, core_problem, core_threads
+from photogram.stellar.problem import NO_PRIOR, core_problem, core_threads
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_cameras import SkyCamera, weight_of
 from photogram.words import Phrase, phrase
@@ -286,7 +286,7 @@ def _core(
         weights[known] = weight_of(prior.covariance[known])
         rows = np.flatnonzero(prior.known & free)
         names = [camera.names[i] for i in rows]
-        weighted = Prior(place[rows], prior.values[rows], weights[np.ix_(rows, rows)], names)
+        weighted = place[rows], prior.values[rows], weights[np.ix_(rows, rows)], names
     attitudes = [exposure.attitude for exposure in exposures]
     return core_problem(
         site,
