@@ -16,26 +16,11 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.adjustment import Progress
 from photogram.arguments.types import Floats
+from photogram.distributed import tasks
 from photogram.distributed.cut import Tree
 from photogram.distributed.executors import Executor, Handle
 from photogram.distributed.run import Course
-from photogram.distributed.tasks import (
-    Chord,
-    InDatum,
-    Job,
-    Point,
-    counted,
-    evaluated,
-    finished,
-    located,
-    reduced_chord,
-    redundancies,
-    relocated,
-    settled,
-    solved,
-    solved_chord,
-    write_state,
-)
+from photogram.distributed.tasks import Chord, InDatum, Job, Point, reduced_chord, solved_chord
 from photogram.distributed.walks import Up, Walks
 from photogram.errors import AdjustmentError, RankError
 from photogram.lazy_dataclasses import dataclass
@@ -100,7 +85,7 @@ class Driver:
 
     def _run(self) -> Outcome:
         course = self._course
-        found = np.array(self._walks.all(counted, phase="read")).sum(axis=0)
+        found = np.array(self._walks.all(tasks.counted, phase="read")).sum(axis=0)
         self._unknowns: tuple[int, int, int, int, int, int] = tuple(found.tolist())
         if course.ending is not None:
             return self._finish(None)
@@ -111,7 +96,7 @@ class Driver:
             course.initial = course.best = up.sum_of_squares
             if self._mover is not None:
                 # Reject an undefined datum before the adjustment.
-                self._mover(self._walks.all(located, course.state, phase="solve"))
+                self._mover(self._walks.all(tasks.located, course.state, phase="solve"))
         return self._full_steps(up) if self.options.criterion == "percent" else self._damped_steps(up)
 
     def _full_steps(self, up: Up) -> Outcome:
@@ -171,7 +156,7 @@ class Driver:
         if change > RULES["far"] * math.sqrt(self._unknowns[4]):
             # Points are intersected again if this lowers the sum of squares.
             other = self._new_state()
-            sums = np.array(self._walks.all(relocated, after, other, phase="solve"))
+            sums = np.array(self._walks.all(tasks.relocated, after, other, phase="solve"))
             before, moved = sums.sum(axis=0).tolist()
             self._walks.remove(after if moved < before else other)
             after = other if moved < before else after
@@ -252,8 +237,8 @@ class Driver:
             if up is not None:
                 self._walks.forget(up)
             formed = f"{after}-in-datum"
-            for node, arrays in enumerate(self._mover(self._walks.all(located, after, phase="solve"))):
-                write_state(self.job, node, formed, arrays)
+            for node, arrays in enumerate(self._mover(self._walks.all(tasks.located, after, phase="solve"))):
+                tasks.write_state(self.job, node, formed, arrays)
             after, up = formed, None
         if up is None:
             up = self._up(Point(formed))
@@ -264,13 +249,13 @@ class Driver:
             self._walks.invert(up, after, variance, datum)
             if self.options.unit_variance == "redundancy":
                 # The nodes scale their results by q / r, except for photos (docs/weights.md).
-                numbers = self._walks.all(redundancies, phase="invert")
+                numbers = self._walks.all(tasks.redundancies, phase="invert")
                 freedom = math.fsum(share for _, *measured in numbers for share in measured)
                 variance = sum(sums[1:]) / freedom if freedom > RULES["least_redundancy"] else None
-                self._walks.all(settled, variance, phase="invert")
+                self._walks.all(tasks.settled, variance, phase="invert")
                 freedom = round(freedom, 6)
         else:
-            self._walks.all(finished, course.before, after, variance, phase="invert")
+            self._walks.all(tasks.finished, course.before, after, variance, phase="invert")
         self._walks.forget(up)
         return Outcome(
             status,
@@ -287,7 +272,7 @@ class Driver:
 
     def _evaluated(self, state: str) -> tuple[float, float, float, float, float]:
         """Return weighted sums of squares of all nodes, by type, and the objective function."""
-        found = np.array(self._walks.all(evaluated, state, phase="solve"))
+        found = np.array(self._walks.all(tasks.evaluated, state, phase="solve"))
         # Add sequentially, because the order of NumPy sums depends on their length.
         camera, ground, plates, others, minimised = (sum(column) for column in found.T.tolist())
         return camera, ground, plates, others, minimised
@@ -313,7 +298,9 @@ class Driver:
     def _step(self, up: Up) -> str:
         """Solve from the root down and write the state after the step; return its name."""
         after = self._new_state()
-        self._walks.substitute(up, lambda node, outer: self._walks.do(solved, node, up.at, after, outer))
+        self._walks.substitute(
+            up, lambda node, outer: self._walks.do(tasks.solved, node, up.at, after, outer)
+        )
         return after
 
     def _with_chord(self, up: Up, after: str, change: float) -> str:
