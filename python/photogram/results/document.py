@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import asdict, replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,12 +20,14 @@ from photogram.results.datum import observed_control
 from photogram.results.features import features_members, features_section
 from photogram.results.film_report import films_section
 from photogram.results.network_tables import control, plan_deviations, point_axes
-from photogram.results.result import Result
 from photogram.results.trajectories import notable, trajectories_table
 from photogram.show.page import Document, Fact, Section, about, conventions
 from photogram.show.quantity import Quantity, Table, chosen, for_people, members, named, records
 from photogram.statistics.freedom import root_mean
 from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 
 @np.errstate(over="ignore", invalid="ignore")  # values too large for their unit are infinite

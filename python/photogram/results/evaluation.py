@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,7 +14,6 @@ from photogram.arguments.arrays import finite_rows
 from photogram.arguments.types import Floats, Indices
 from photogram.results.hypotheses import DETECTION, Hypotheses
 from photogram.results.hypothesis_tests import hypotheses
-from photogram.results.network import AdjustedNetwork
 from photogram.results.network_trial import (
     CONTROL,
     IMAGE,
@@ -32,6 +31,9 @@ from photogram.statistics.findings import LARGEST_FACTOR, NOMINAL, Text, TypeFac
 from photogram.statistics.limits import global_test
 from photogram.statistics.reliability import TESTABLE
 from photogram.statistics.weight_rules import wrong_types
+
+if TYPE_CHECKING:
+    from photogram.results.network import AdjustedNetwork
 
 MOST_WAITING = 1_000_000  # Groups of a network whose factor and inverse wait for a report
 

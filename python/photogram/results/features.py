@@ -19,7 +19,6 @@ from photogram.errors import AdjustmentError, InputError, message_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message, by_name, unknown_name
 from photogram.results.covariance import Covariances, used_rows
-from photogram.results.result import Result
 from photogram.show import quantity
 from photogram.show.page import Drawing, Part, Section, Text, about
 from photogram.show.quantity import Axis, Table, for_people, members, of_each
@@ -28,6 +27,8 @@ from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from photogram import Result
 
 
 _UNIT = "unit of values, residuals and deviations of this row; empty if dimensionless"

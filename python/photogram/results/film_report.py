@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,10 +16,12 @@ from photogram.plots.picture_data import VectorField
 from photogram.results.films import numbers_of_film
 from photogram.results.network_tables import image_axes
 from photogram.results.network_trial import OBSERVATION, type_name
-from photogram.results.result import Result
 from photogram.results.tables import Tests
 from photogram.show.page import Drawing, Part, Section, about
 from photogram.show.quantity import Axis, Quantity, Table, for_people, members_of_each, of_each
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 STEPS = 9  # Positions of a pattern along a side of the format
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from photogram.results.hypothesis_tests import largest_odds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.patterns import block_patterns
-from photogram.results.result import Result
 from photogram.results.tables import Tests
 from photogram.statistics.findings import (
     CONTROL_POINTS,
@@ -35,6 +34,9 @@ from photogram.statistics.findings import (
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 HARMFUL = {
     reason: Phrase(f"harmful.{reason}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +17,9 @@ from photogram.network.cameras import camera_rows, rays_of_row
 from photogram.network.motion import of_pictures, scanners
 from photogram.network.rays import LocalAxes, local_axes
 from photogram.results.fixed_tests import as_adjusted
-from photogram.results.result import Result
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 SIDE = 4  # Vertices of an outline on each side of the image
 HORIZON = math.radians(80.0)  # Limit of footprints from the vertical

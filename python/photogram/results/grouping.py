@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,6 @@ from photogram.network.strips import strips_of
 from photogram.network.unadjusted import Given
 from photogram.results.datum import point_kinds
 from photogram.results.network import AdjustedNetwork
-from photogram.results.result import Result
 from photogram.show.methods import Tabular
 from photogram.show.page import Document, Section, about
 from photogram.show.quantity import Quantity, Table, column, of_each
@@ -36,6 +35,9 @@ from photogram.statistics.components import Component, GroupsOf, balanced
 from photogram.statistics.distributions import bonferroni
 from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 GroupsArgument = str | Sequence[str] | Mapping[str, Any]
 """A basis, several of them (every combination is a group), or labels by part of the network."""

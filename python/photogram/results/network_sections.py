@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,11 +12,13 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.results import network_tables
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
-from photogram.results.result import Result
 from photogram.results.tables import check_points, observations
 from photogram.show.cells import unit_written
 from photogram.show.page import Layers, Part, Section, Text, about
 from photogram.show.quantity import Quantity, Table, for_people, named
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 WORST = 10
 NEAR = 1e-3  # Distance of points listed first from a station, relative to the median distance

@@ -12,11 +12,11 @@ from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block
 from photogram.network.geometry import lengths_of_units
-from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import Iteration, Terms
 from photogram.show.quantity import Axis, Link, Quantity, column
 
 if TYPE_CHECKING:
+    from photogram.results.network import AdjustedNetwork
     from photogram import Result
 
 

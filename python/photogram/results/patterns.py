@@ -18,6 +18,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -29,13 +30,15 @@ from photogram.network.motion import focal_images
 from photogram.results.fixed_tests import fall_by_lens
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
-from photogram.results.result import Result
 from photogram.statistics import patterns as fits
 from photogram.statistics.distributions import LEVEL, bonferroni
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import Systematic
 from photogram.statistics.reliability import TESTABLE
 from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 LEVEL_OF_PATTERNS = 0.001  # Low, because several patterns are tested
 NOTABLE = 0.3  # Smallest mean residual that matters, in standard deviations

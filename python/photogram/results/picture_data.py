@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from photogram.results.film_report import film_patterns, mean_mark_residuals
 from photogram.results.footprints import footprints, metric_covariances
 from photogram.results.network import AdjustedNetwork
 from photogram.results.parts import AdjustedCamera
-from photogram.results.result import Result
 from photogram.results.tables import Tests
 from photogram.show.page import about
 from photogram.show.sketch.marks import Arrows, Ellipses, Panel, around, ellipse_axes
@@ -29,6 +29,9 @@ from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, INK, round_length
 from photogram.statistics.findings import Tested
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 
 class PicturedNetwork(ABC):

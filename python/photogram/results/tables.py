@@ -15,7 +15,6 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.results import network_tables, parts
 from photogram.results.features import Features, deviation_quantities, quantity_columns
 from photogram.results.grouping import sums_by_kind
-from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import (
     component_axis,
     deviation,
@@ -26,7 +25,6 @@ from photogram.results.network_tables import (
     test_value,
 )
 from photogram.results.network_trial import KINDS, OBSERVATION, type_name
-from photogram.results.result import Result
 from photogram.show.cells import unit_written
 from photogram.show.quantity import Axis, Link, Quantity, column, component, joined, long
 from photogram.statistics.distributions import lambda0
@@ -35,7 +33,8 @@ from photogram.statistics.reliability import TESTABLE, minimal_detectable_error
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
-    pass
+    from photogram.results.network import AdjustedNetwork
+    from photogram import Result
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

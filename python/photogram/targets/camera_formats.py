@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 from photogram.arguments.arrays import one_of
 from photogram.errors import InputError
 from photogram.io import json
-from photogram.targets.calibration_result import Calibrated
 from photogram.targets.mrcal import mrcal_models, valid_region
 from photogram.targets.output import Rig, kalibr_camchain, opencv_yaml, rig_of, ros_camera_info
 from photogram.targets.uncertainty import uncertainty_map
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 CAMERA_FORMATS: Mapping[str, Callable[[Rig], dict[str, bytes]]] = MappingProxyType(
     {

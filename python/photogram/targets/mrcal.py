@@ -14,7 +14,7 @@ import math
 import re
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,7 +29,6 @@ from photogram.network.knots import KNOTTED
 from photogram.network.opencv_lens import TERMS, opencv_lens
 from photogram.targets.board import Board
 from photogram.targets.calibration import Calibration
-from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corner_files import KEY
 from photogram.targets.corners import Corners
 from photogram.targets.opencv_corners import Arrays, read_arrays
@@ -37,6 +36,9 @@ from photogram.targets.output import Rig
 from photogram.targets.uncertainty import UncertaintyMap
 from photogram.targets.vision import inverted, of_vectors
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 PREFIX = "LENSMODEL_"
 CORE = ("fx", "fy", "cx", "cy")

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Sequence
 from itertools import islice, product
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,7 +27,6 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.summaries import Brief, Rows
 from photogram.targets.board import Board
-from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import (
     Housing,
     camera_number,
@@ -42,6 +42,9 @@ from photogram.targets.housing import (
 from photogram.targets.uncertainty import at_distance, checked_distance, image_grid, parts_of
 from photogram.targets.vision import TURNED, composed, inverted, motion_partials, rays, transformed
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 MIN_CORNERS_PER_PICTURE = 12
 CORNER_MARGIN_PX = 5.0  # around a corner, for its detection

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,9 +19,11 @@ from photogram.io.yaml_text import camera_info, figures, matrix_lines
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
 from photogram.network.opencv_lens import TERMS, OpencvLens, opencv_lens
-from photogram.targets.calibration_result import Calibrated
 from photogram.targets.vision import cross_matrices, inverted
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 
 @dataclass(frozen=True, eq=False)

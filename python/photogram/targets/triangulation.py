@@ -12,7 +12,7 @@ points: averaging many points does not reduce them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal, get_args
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,11 +24,13 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.rays import meet_rays
-from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import Housing, camera_number, housed_with, housing_of, housing_rows, size_of
 from photogram.targets.uncertainty import image_grid
 from photogram.targets.vision import imaged, motion_partials, photo_poses, rays, transformed
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 TOLERANCE = 1e-9  # in standard deviations of a point
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,12 +27,14 @@ from photogram.results import network_trial
 from photogram.results.components import VarianceComponents
 from photogram.results.covariance import Covariances, Item, adjusted, used_rows
 from photogram.results.grouping import Grouping, Left, Probing, grouped, observables
-from photogram.results.result import Result
 from photogram.results.statement.request import invalid
 from photogram.results.statement.texts import Texts
 from photogram.show.page import decimals_of
 from photogram.statistics.freedom import coverage_factor, joint_freedom, welch_satterthwaite
 from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 LARGEST = 5  # Listed single observations
 EXACT = 5000  # Rows up to which degrees of freedom are computed without estimated components

@@ -17,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -34,9 +35,12 @@ from photogram.network.observations import Control
 from photogram.network.rays import local_axes
 from photogram.results.covariance import Covariances
 from photogram.results.network_tables import point_axes
-from photogram.results.result import NOT_PHOTOGRAPHED, Result
+from photogram.results.result import NOT_PHOTOGRAPHED
 from photogram.results.statement.request import METRES, Asked
 from photogram.words import phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 PARTS = {"e": (0,), "n": (1,), "h": (2,), "plan": (0, 1), "all": (0, 1, 2)}
 """Components that are tested jointly."""

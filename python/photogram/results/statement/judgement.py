@@ -10,7 +10,6 @@ import numpy as np
 
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
-from photogram.results.result import Result
 from photogram.results.statement.budget import budget_fields
 from photogram.results.statement.comparison import LEVEL, LeftOut, limit_of
 from photogram.results.statement.figures import Figures, Prediction, Surface
@@ -25,7 +24,7 @@ from photogram.statistics.verdict import Rule, fitting_rules
 from photogram.words import Phrase
 
 if TYPE_CHECKING:
-    from photogram import Statement
+    from photogram import Result, Statement
 
 NOT_USABLE = 4  # Exit code
 HEIGHT_KINDS = 10.0  # Mean difference between two height systems (sd)

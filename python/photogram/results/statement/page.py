@@ -17,7 +17,6 @@ from photogram.results.features import quantity_columns, through, unit_deviation
 from photogram.results.footprints import footprints
 from photogram.results.network_sections import fit_of_images
 from photogram.results.parts import AdjustedCamera
-from photogram.results.result import Result
 from photogram.results.statement import tables as declared
 from photogram.results.statement.budget import Budget, budget_fields
 from photogram.results.statement.comparison import Compared, control_places, in_order
@@ -33,7 +32,7 @@ from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, SOFT, VERMILION, round_length
 
 if TYPE_CHECKING:
-    from photogram import Statement
+    from photogram import Result, Statement
 
 MAX_FINE_SOURCES = 12  # Sources of a budget in addition to the types of observations
 MAX_RADII = 11

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,7 +24,6 @@ from photogram.messages import counted
 from photogram.network import hull
 from photogram.network.observations import Control
 from photogram.results.covariance import used_rows
-from photogram.results.result import Result
 from photogram.results.statement import comparison, lengths
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.lengths import LengthTest
@@ -33,6 +32,9 @@ from photogram.show.quantity import members
 from photogram.show.sketch.marks import ellipse_axes
 from photogram.statistics.error_radii import circular_error
 from photogram.statistics.freedom import rmse_interval, root_mean
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 ASPRS_POINTS = 30  # Check points of a tested product (7.13); with fewer it is produced to meet a class
 MOST_STEPS = 10  # Number of steps of 1,000 km2, after which the number of check points is constant

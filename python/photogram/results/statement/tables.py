@@ -12,7 +12,6 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.io.csv_text import csv_text
 from photogram.results.grouping import sums_by_kind
-from photogram.results.result import Result
 from photogram.results.statement.budget import Budget, kind_of
 from photogram.results.statement.comparison import LeftOut, limit_of
 from photogram.results.statement.figures import Figures, Sized, point_tests
@@ -26,7 +25,7 @@ from photogram.statistics.freedom import coverage_factor
 from photogram.words import phrase
 
 if TYPE_CHECKING:
-    from photogram import Statement
+    from photogram import Result, Statement
 
 DIRECTIONS = ("e", "n", "h")
 BLANK = " "  # Header of a column without a name
