@@ -203,11 +203,12 @@ VISION = np.outer([1.0, -1.0, -1.0], [1.0, -1.0, -1.0])
 
 
 def inertial_attitudes(
-    angles: Floats, covariances: Floats, site: Site, utcs: Sequence[str], earth: Earth
+    angles: Floats, covariances: Floats, site: Site, utcs: Sequence[str], earth: Earth | None = None
 ) -> Attitudes:
     """Return attitudes in ICRS from alpha, omega, kappa (E, 3) with covariances (E, 3, 3).
 
-    Angles and station refer to the mean pole. Aberration and refraction are ignored.
+    Angles and station refer to the mean pole; without `earth` UT1 - UTC and the pole are zero. Aberration and
+    refraction are ignored.
 
     Notes
     -----
@@ -215,6 +216,7 @@ def inertial_attitudes(
     angle and declination, apparent sidereal time the true equator and equinox. The transposed matrix of bias,
     precession and nutation (IAU 2006/2000A) rotates to ICRS.
     """
+    earth = earth or Earth()
     place = earth.site_of_date(site)
     to_date_pole = terrestrial(place).T @ pole_matrix(earth.pole).T @ terrestrial(site)
     matrices, steps = [], []
