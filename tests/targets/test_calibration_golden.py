@@ -9,7 +9,7 @@ from given_targets import golden, left_table, poses_of, rig_cofactors, rig_small
 from golden_data import shared
 from photogram.targets import read
 from photogram.targets.page import prior_shift
-from photogram.targets.rounds import regularised
+from photogram.targets.regularisation import regularised
 
 REGULARISED = ("k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6", "cx", "cy")
 

@@ -17,7 +17,7 @@ from photogram.targets import Board, Calibration, Corners, cross_validate, proje
 from photogram.targets.mrcal import mrcal_models
 from photogram.targets.output import rig_of
 from photogram.targets.page import splines
-from photogram.targets.rounds import regularised, with_knot_sd
+from photogram.targets.regularisation import regularised, with_knot_sd
 from photogram.targets.vision import composed
 
 

@@ -16,8 +16,8 @@ from photogram.results.parts import Iteration, Terms
 from photogram.show.quantity import Axis, Link, Quantity, column
 
 if TYPE_CHECKING:
-    from photogram.results.network import AdjustedNetwork
     from photogram import Result
+    from photogram.results.network import AdjustedNetwork
 
 
 TURNS = tuple(Axis.turned(name, "deg") for name in ("omega", "phi", "kappa"))  # Of attitudes

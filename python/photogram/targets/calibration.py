@@ -32,7 +32,8 @@ from photogram.targets.calibration_result import Calibrated
 from photogram.targets.corners import Corners, check_points
 from photogram.targets.motion import MAX_GAP_SECONDS, POWERS, dated, moved, moving, pictures_in_motion
 from photogram.targets.options import Regularisation, Shape, Synchronisation
-from photogram.targets.rounds import better_start, checked_clocks, marked_as_mrcal, weighted_block
+from photogram.targets.regularisation import weighted_block
+from photogram.targets.rounds import better_start, checked_clocks, marked_as_mrcal
 from photogram.targets.vision import FLIP, photo_poses, transformed
 from photogram.words import phrase
 

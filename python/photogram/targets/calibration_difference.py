@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Self, get_args
+from typing import TYPE_CHECKING, Self, get_args
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from photogram.network.cameras import Camera
 from photogram.network.hull import hull, outside
 from photogram.statistics.distributions import log_chi_square, log_fisher
 from photogram.summaries import Brief, Rows
-from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import (
     camera_number,
     datum_rows,
@@ -35,6 +34,9 @@ from photogram.targets.lens_fit import Criterion, Fitted, fitted_motion
 from photogram.targets.uncertainty import at_distance, checked_distance, image_grid
 from photogram.targets.vision import imaged, points_at, transformed, unknown_of, values_of
 from photogram.words import Phrase, phrase
+
+if TYPE_CHECKING:
+    from photogram.targets import Calibrated
 
 RANK_TOLERANCE = 1e-5  # smaller singular values, relative to the largest, are rounding errors
 TEST_GRID = (12, 8)  # pixels across and down, for cameras of different models
@@ -236,11 +238,11 @@ def difference(
     distances = [distance] if isinstance(distance, float | int) else list(distance)
     if not distances:
         raise argument_error("distance", "empty")
+    first, second = _side(a, camera, "a"), _side(b, camera, "b")
     if size is None:
-        if not isinstance(a, Calibrated):
+        if isinstance(a, Camera):
             raise argument_error("size", "empty")
         size = size_of(a, camera_number(a, camera))
-    first, second = _side(a, camera, "a"), _side(b, camera, "b")
     away = tuple(checked_distance(each) for each in distances)
     one_of("criterion", criterion, get_args(Criterion))
     columns, rows, pixels = image_grid(size, grid)
@@ -285,7 +287,7 @@ def difference(
     return CameraDifference(
         cameras=(first.name, second.name),
         size=size,
-        unit=next((each.calibration.board.unit for each in (a, b) if isinstance(each, Calibrated)), "m"),
+        unit=next((each.calibration.board.unit for each in (a, b) if not isinstance(each, Camera)), "m"),
         criterion=criterion,
         fitted=fitted,
         columns=columns,
@@ -325,10 +327,10 @@ class Side:
         return ~outside(pixels, hull(self.corners)) if len(self.corners) else np.ones(len(pixels), dtype=bool)
 
 
-def _side(given: object, camera: int | str, name: str) -> Side:
+def _side(given: Calibrated | Camera, camera: int | str, name: str) -> Side:
     if isinstance(given, Camera):
         return Side(given.name or name, given)
-    if not isinstance(given, Calibrated):
+    if not hasattr(given, "calibration"):
         raise InputError(phrase("targets.no-calibration", name=name, value=value_field(given)))
     number = camera_number(given, camera)
     housing, own = housing_of(given, number)

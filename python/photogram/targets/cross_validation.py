@@ -30,7 +30,6 @@ from photogram.targets.calibration_difference import (
     DifferenceTest,
     squares_of,
 )
-from photogram.targets.calibration_result import Calibrated
 from photogram.targets.housing import (
     Housing,
     camera_number,
@@ -47,6 +46,7 @@ from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
     from photogram.adjustment.robust import Loss
+    from photogram.targets import Calibrated
 
 
 RANK_TOLERANCE = 1e-6  # smaller relative cofactors of a change are due to the common priors
@@ -287,7 +287,7 @@ def _adjusted(whole: Calibrated, pictures: Bools, cameras: list[int]) -> Calibra
     sd = np.concatenate([each.deviations for each in own])
     if (np.isfinite(sd) & (sd > 0)).any():
         result = adjusted(part.block(own), result.options, start=result.state)
-    return Calibrated.of(result, part)
+    return type(whole).of(result, part)
 
 
 DISTANCE_FIGURES = 2  # significant digits of the median board distance

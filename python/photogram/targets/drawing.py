@@ -13,13 +13,12 @@ from photogram.lazy_dataclasses import replace
 from photogram.show.sketch.marks import Arrows, Line, Mark, Markers, Panel, Shades, contours
 from photogram.show.sketch.plot import Plot
 from photogram.show.style import BLUE, FAINT, INK, VERMILION, round_length
-from photogram.targets.calibration_difference import CameraDifference
-from photogram.targets.cross_validation import CrossValidation
 from photogram.targets.grouping import CRITICAL_TEST_VALUE, group_statistics, outlying_images
 from photogram.targets.uncertainty import UncertaintyCurve, UncertaintyMap, at_distance
 
 if TYPE_CHECKING:
-    from photogram.targets import Calibrated
+    from photogram.targets import Calibrated, CrossValidation
+    from photogram.targets.calibration_difference import CameraDifference
 
 
 MAX_DOTS = 4000  # plotted corners

@@ -28,7 +28,7 @@ from photogram.targets.first_camera import (
     usual_models,
 )
 from photogram.targets.lens_fit import KNOTS, fitted, free_names, grid_of_pixels, lens_of
-from photogram.targets.rounds import WEAK_KNOT_SD
+from photogram.targets.regularisation import WEAK_KNOT_SD
 from photogram.targets.sightings import (
     CORNER_ORDERS,
     Sightings,

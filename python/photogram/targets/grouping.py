@@ -22,7 +22,7 @@ from photogram.results.components import VarianceComponents
 from photogram.results.grouping import GroupsArgument
 from photogram.show.quantity import Axis, Quantity, chosen, column
 from photogram.targets.options import CornerBasis
-from photogram.targets.rounds import weighted_block
+from photogram.targets.regularisation import weighted_block
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:

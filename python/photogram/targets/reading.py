@@ -25,7 +25,7 @@ from photogram.targets.lens_fit import KNOTS
 from photogram.targets.mrcal import read_model
 from photogram.targets.opencv_corners import read_npz
 from photogram.targets.options import CalibrationOptions
-from photogram.targets.rounds import with_knot_sd
+from photogram.targets.regularisation import with_knot_sd
 from photogram.words import phrase
 
 if TYPE_CHECKING:

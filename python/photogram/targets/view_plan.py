@@ -41,7 +41,7 @@ from photogram.targets.new_views import (
     views_towards,
 )
 from photogram.targets.page import drawings, worth_facts, worth_members
-from photogram.targets.rounds import weighted_block
+from photogram.targets.regularisation import weighted_block
 from photogram.targets.uncertainty import UncertaintyMap, at_distance, checked_distance, uncertainty_map
 from photogram.targets.vision import rays, transformed
 from photogram.words import phrase
