@@ -382,12 +382,31 @@ def _not_tested(e: Evidence) -> Phrase | None:
 
 CONTROL = "named.control"  # Code of the name of a control point
 
-_WITH_CHECK = {"first-values", "determine", "common-of-images", "common-of-observations", "wrong-checks"}
-_WITH_CHECK |= {"largest-tests"}
+_WITH_CHECK = frozenset(
+    {
+        "first-values",
+        "determine",
+        "common-of-images",
+        "common-of-observations",
+        "wrong-checks",
+        "largest-tests",
+    }
+)
 """Advice that names how the program searches for mistakes of the input."""
 
-_EXPLAINING = {"common-error", "gross-errors", "too-much-removed", "usable-after-removal", "intersection"}
-_EXPLAINING |= {"weights", "weights-of-groups", "weights-of-types", "model"}
+_EXPLAINING = frozenset(
+    {
+        "common-error",
+        "gross-errors",
+        "too-much-removed",
+        "usable-after-removal",
+        "intersection",
+        "weights",
+        "weights-of-groups",
+        "weights-of-types",
+        "model",
+    }
+)
 """Rules that explain residuals that are too large."""
 
 _unchecked = _listing("accepted-not-checked", "errors", "unchecked")
