@@ -1040,7 +1040,7 @@ class Node:
         """
 
     @property
-    def ends_slowly(self) -> bool:
+    def converges_linearly(self) -> bool:
         """Whether photos share free or weighted cameras, so that a final chord helps (docs/adjustment.md)."""
 
     def prediction(self, threads: int) -> dict[str, float]:
@@ -1486,7 +1486,7 @@ class BlockState:
     ----------
     unknowns
         Adjusted values, in the order of the core.
-    held, collapsed, loose
+    held, collapsed, undetermined_photos
         Unknowns fixed for a datum; points excluded because they converged to a station or their rays do not
         determine them; photos excluded because their images do not determine them.
     ordering
@@ -1508,7 +1508,7 @@ class BlockState:
         unknowns: list[float],
         held: list[int],
         collapsed: list[int],
-        loose: list[int],
+        undetermined_photos: list[int],
         ordering: str,
         datum: _DatumRow | None,
         released: bool,

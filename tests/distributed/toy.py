@@ -102,7 +102,7 @@ def adjusted(folder: Path, tolerance=1e-5):
 class ToyNode:
     """A node: its unknowns are those of its points, its stations, then of the outer ones."""
 
-    ends_slowly = False
+    converges_linearly = False
 
     def __init__(self, folder: Path, number: int):
         self.toy = toy = Toy(folder)

@@ -21,9 +21,9 @@
 //! | active points, photos and images | `network` | `Selected` |
 //! | parameters and observation equations | `network` | `Bundle`, `Assembled` |
 //! | pattern of the normal equations | `normals` | `Layout`, `Symbolic`, `Incidence`, `System` |
-//! | least-squares problem | `adjustment` | `Problem`, `Terms` |
+//! | least-squares problem | `adjustment` | `Problem`, `PriorTerms` |
 //! | iterations | `adjustment` | `Run`, `Linearized` |
-//! | values at given parameters | `network` | `Stations` |
+//! | values at given parameters | `network` | `LinearizationPoint` |
 //! | image, pose and point | `geometry` | `Camera`, `Orientation`, `Point` |
 //! | weighted equations | `adjustment` | `Evaluated`, `ObservationEquations` |
 //! | rows and normal matrices | `normals` | `GroupRows`, `Prior`, `Batch`, `Front`, `Formation` |

@@ -329,7 +329,7 @@ def counted(job: Job, number: int) -> tuple[int, int, int, int, int, int]:
     with shelf.lock:
         node = _node(job, number)
         size = len(node.initial) - len(node.outer)
-        return *node.counts, job.engine.stations(job.folder, number), size, int(node.ends_slowly)
+        return *node.counts, job.engine.stations(job.folder, number), size, int(node.converges_linearly)
 
 
 def located(job: Job, number: int, state: str) -> tuple[Indices, Floats]:

@@ -25,9 +25,13 @@ FEWEST = 2  # Smallest number of points that an undetected error moves
 SHARE = 0.05  # Share of points that a notable undetected error moves in a plan
 MARGIN = 0.75  # Standard deviations of an error beyond its estimate up to which the observations admit it
 RARE = 0.1  # Plausible errors of a set that may remain undetected
-_TERMS = ("camera-affinity", "camera-radial", "camera-exchanged", "camera-size")
-_TIMES = ("time-offset", "readout-time", "readout-time-columns")
-OF_CAMERAS = {"camera-f", "camera-f-single", "camera-point", "camera-term", *_TERMS, *_TIMES[1:]}
+OF_CAMERAS = frozenset(
+    {
+        *("camera-f", "camera-f-single", "camera-point", "camera-term", "readout-time"),
+        "readout-time-columns",
+        *("camera-affinity", "camera-radial", "camera-exchanged", "camera-size"),
+    }
+)
 SHARES = ("gnss-next", "gnss-previous", "camera-exchanged")  # Their parameter is 0 or 1
 DETECTED = 4.13  # Standard deviations of an error that a test detects: root of lambda0
 WHOLE = 0.1  # Standard deviation of this parameter if it is 1
@@ -44,9 +48,19 @@ MAIN = 0.8  # Share of the square of an error above which one component stands f
 DETECTION = 0.001, 0.80  # Significance level and power of the MDB
 
 DATUM = frozenset(
-    [f"control-{each}" for each in ("heights", "shift", "scale", "rotation", "set")]
-    + [f"gnss-{each}" for each in ("heights", "shift", "set", "half")]
-    + ["distance-scale", "scale"]
+    {
+        "control-heights",
+        "control-shift",
+        "control-scale",
+        "control-rotation",
+        "control-set",
+        "gnss-heights",
+        "gnss-shift",
+        "gnss-set",
+        "gnss-half",
+        "distance-scale",
+        "scale",
+    }
 )
 """Errors that only change the datum: assumptions, unless independent observations or check points test them.
 
@@ -58,9 +72,12 @@ UNGRADED = frozenset({"bending", "control-bending"})
 """Undetected errors that are no reason for a reservation: terms of distortion, which bend a network, have
 hypotheses of their own."""
 
-RARE_ERRORS = frozenset(("attitude", "photo", "object-point", "camera", "unknown", "fixed-point")) | {
-    *("camera-f-strip", "camera-f-half", "camera-size", "readout-time-columns")
-}
+RARE_ERRORS = frozenset(
+    {
+        *("attitude", "photo", "object-point", "camera", "unknown", "fixed-point"),
+        *("camera-f-strip", "camera-f-half", "camera-size", "readout-time-columns"),
+    }
+)
 """Errors that are no reason for a reservation if nothing tests them, or before the observation: of single
 photos and targets, of weighted parameters, principal distances of a strip or a flight, resized images, and a
 readout by columns."""
@@ -185,8 +202,11 @@ class Hypotheses:
                 self.suspects.given.image_unit,
             ),
             **dict.fromkeys(("attitude", "boresight", "control-rotation"), "rad"),
-            **dict.fromkeys(("camera-term", "camera", "unknown", *_TERMS, *SCALES, *SHARES), ""),
-            **dict.fromkeys(_TIMES, self.times),
+            **dict.fromkeys(("camera-term", "scale", "control-scale", "camera", "unknown"), ""),
+            **dict.fromkeys(
+                ("camera-affinity", "camera-radial", "camera-size", "distance-scale", *SHARES), ""
+            ),
+            **dict.fromkeys(("time-offset", "readout-time", "readout-time-columns"), self.times),
         }
         return f" {units.get(str(self.code[row]), unit_written(self.axes[2].small))}".rstrip()
 
@@ -230,20 +250,24 @@ class Hypotheses:
     def sentence(self, row: int) -> Phrase:
         """Return the message on an undetected error with a known effect, and on its special cases."""
         if not self.sizes[row]:
-            sentence = phrase("unchecked.any", named=self.name(row))
+            error = phrase("unchecked.any", named=self.name(row))
         else:
-            named, unit, error = self.name(row), self._unit(row), self.admitted(row) * self.errors[row]
-            squares = np.square(error)
-            size = f"{math.sqrt(squares.sum()):.3g}{unit}"
-            parts = np.flatnonzero((self.group == self.group[row]) & (self.component >= 0))
-            if len(parts) == len(error) and squares.max() > MAIN * squares.sum():
-                main = int(squares.argmax())
-                size, named = f"{abs(error[main]):.3g}{unit}", self.name(int(parts[main]))
+            size, named = self._main_component(row)
             code = "unchecked.planned" if self.planned else "unchecked.size"
             percent = 100 * self.effects[row].points / self.points
-            sentence = phrase(code, size=size, named=named, percent=percent, ratio=self.moved(row))
+            error = phrase(code, size=size, named=named, percent=percent, ratio=self.moved(row))
         special = len(self._special_cases(row))
-        return phrase("unchecked.nested", error=sentence, n=special) if special else sentence
+        return phrase("unchecked.nested", error=error, n=special) if special else error
+
+    def _main_component(self, row: int) -> tuple[str, Phrase]:
+        """Return the size of the largest admitted error, and its name or that of its main component."""
+        unit, error = self._unit(row), self.admitted(row) * self.errors[row]
+        squares = np.square(error)
+        parts = np.flatnonzero((self.group == self.group[row]) & (self.component >= 0))
+        if len(parts) == len(error) and squares.max() > MAIN * squares.sum():
+            main = int(squares.argmax())
+            return f"{abs(error[main]):.3g}{unit}", self.name(int(parts[main]))
+        return f"{math.sqrt(squares.sum()):.3g}{unit}", self.name(row)
 
     def assumed(self, least: int = 0) -> list[Phrase]:
         """Return untested observations that define the datum, or whose errors move `least` points or more."""
@@ -258,14 +282,15 @@ class Hypotheses:
         graded = {str(self.code[row]) for row in self.harmful}
         sources = [("control-heights", "control-shift"), ("gnss-heights", "gnss-shift"), ("distance-scale",)]
         codes = [own[0] for own in sources if untested.intersection(own) and not graded.intersection(own)]
-        assumptions = []
-        for code in codes:
-            rows = [row for row in np.flatnonzero(self.code == code).tolist() if row in self.relative]
-            assumptions.append(phrase(f"datum.{code}"))  # Also of control without heights
-            if rows:  # The error of heights that check points detect
-                size = f"{DETECTED * math.sqrt(self.sets[rows[0]]['cofactors'][0]):.2g}{self._unit(rows[0])}"
-                assumptions[-1] = phrase(f"datum.{code}.checks", size=size)
-        return assumptions
+        return [self._assumption(code) for code in codes]
+
+    def _assumption(self, code: str) -> Phrase:
+        """Return the source of the datum, with the error of its heights that check points detect."""
+        row = next((row for row in np.flatnonzero(self.code == code).tolist() if row in self.relative), None)
+        if row is None:  # Also of control without heights
+            return phrase(f"datum.{code}")
+        size = DETECTED * math.sqrt(self.sets[row]["cofactors"][0])
+        return phrase(f"datum.{code}.checks", size=f"{size:.2g}{self._unit(row)}")
 
     def common(self, rivals: float = -math.inf) -> list[int]:
         """Return rows of common errors that explain more than single values, the likeliest first."""
@@ -278,13 +303,8 @@ class Hypotheses:
         if self.statistic[found[0]] < EXPLAINED * self.excess:
             return []
         # Second-order terms of a large error exceed the odds between this error and its special case.
-        for row in found:
-            # A share that is 1 and explains as much as the likeliest error
-            nearly = NEARLY_EXCHANGED if self.code[row] == "camera-exchanged" else NEARLY
-            is_one = self.code[row] in SHARES and abs(self.estimate[row, 0] - 1.0) < 3 * WHOLE
-            if is_one and self.statistic[row] > nearly * self.statistic[found[0]]:
-                return [row]
-        return [row for row in found if odds[row] > odds[found[0]] - math.log(ALTERNATIVES)]
+        special = [row for row in found if self.code[row] in SHARES and self._is_whole(row, found[0])]
+        return special[:1] or [row for row in found if odds[row] > odds[found[0]] - math.log(ALTERNATIVES)]
 
     def inseparable(self, rivals: float = -math.inf) -> list[Phrase]:
         """Return a message on errors of sets whose tests hardly differ from that of the likeliest one."""
@@ -300,6 +320,12 @@ class Hypotheses:
         names = [self.name(row) for row in others]
         fields = {"named": self.name(found[0]), "others": names, "correlation": SEPARABLE}
         return [Phrase("line.inseparable", fields)] if names else []
+
+    def _is_whole(self, row: int, first: int) -> bool:
+        """Whether a share is 1 and explains as much as the likeliest error."""
+        is_one = abs(self.estimate[row, 0] - 1.0) < 3 * WHOLE
+        nearly = NEARLY_EXCHANGED if self.code[row] == "camera-exchanged" else NEARLY
+        return bool(is_one and self.statistic[row] > nearly * self.statistic[first])
 
     def _is_significant(self, row: int) -> bool:
         """Whether the test of a set rejects, and its error has a plausible size or explains nearly all.
@@ -324,26 +350,22 @@ class Hypotheses:
 
     def common_errors(self, rivals: float = -math.inf) -> list[Phrase]:
         """Return messages on these errors, the most likely first, then single errors that are as likely."""
-        found, sets, messages = self.common(rivals), len(self.sets), list[Phrase]()
-        likely = self._likely(found[0]) if found else []
-        singles = [row for row in likely if row >= sets and self.probability[row] < DETECTION[0]]
-        for row in (*found, *singles):
-            named, odds = self.name(row), math.exp(self.log_odds[found[0]] - self.log_odds[row])
-            code = f"{'error' if row == found[0] else 'alternative'}{'.checks' * (row in self.relative)}"
-            if row >= sets:
-                messages.append(phrase("common.single", named=named, odds=odds))
-                continue
-            # The estimate with its standard deviation; the largest of several. The readout time of a moving
-            # photo differs between photos that also rotate.
-            estimate, parameters = self.sets[row]["estimate"], self.sets[row]["parameters"]
-            k = int(np.argmax(np.abs(estimate)))
-            sd = math.sqrt(max(self.sets[row]["cofactors"][k * (len(estimate) + 1)], 0.0))
-            between = self.sets[row]["sd_between_photos"] or 0.0
-            sd = between if between > DIFFERS * sd else sd
-            head = f"{parameters[k]} " if len(estimate) > 1 else ""
-            size = f"{head}{estimate[k]:.4g}{self._unit(row)} (sd {sd:.2g})"
-            messages.append(phrase(f"common.{code}", named=named, size=size, odds=odds))
-        return messages
+        found = self.common(rivals)
+        return [self._common_error(row, found[0]) for row in (*found, *self._singles(found))]
+
+    def _common_error(self, row: int, first: int) -> Phrase:
+        named, odds = self.name(row), math.exp(self.log_odds[first] - self.log_odds[row])
+        if row >= len(self.sets):
+            return phrase("common.single", named=named, odds=odds)
+        code = f"common.{'error' if row == first else 'alternative'}{'.checks' * (row in self.relative)}"
+        return phrase(code, named=named, size=self._size(row), odds=odds)
+
+    def _singles(self, common: list[int]) -> list[int]:
+        """Return rows of single errors that are as likely as a common error, one of each group."""
+        if not common:
+            return []
+        likely = self._likely(common[0])
+        return [row for row in likely if row >= len(self.sets) and self.probability[row] < DETECTION[0]]
 
     def _likely(self, first: int) -> list[int]:
         """Return rows of errors that are as likely as this one, the most likely first, one of each group."""
@@ -354,6 +376,19 @@ class Hypotheses:
         once = np.sort(np.unique(groups, return_index=True)[1])
         return [int(row) for row in likely[once]]
 
+    def _size(self, row: int) -> str:
+        """Return the estimate of a set with its standard deviation; the largest of several.
+
+        The readout time of a moving photo differs between photos that also rotate.
+        """
+        estimate, parameters = self.sets[row]["estimate"], self.sets[row]["parameters"]
+        k = int(np.argmax(np.abs(estimate)))
+        sd = math.sqrt(max(self.sets[row]["cofactors"][k * (len(estimate) + 1)], 0.0))
+        between = self.sets[row]["sd_between_photos"] or 0.0
+        sd = between if between > DIFFERS * sd else sd
+        axis = f"{parameters[k]} " if len(estimate) > 1 else ""
+        return f"{axis}{estimate[k]:.4g}{self._unit(row)} (sd {sd:.2g})"
+
     def of_checks(self) -> list[Phrase]:
         """Return single errors that explain differences of check points best, the most likely first."""
         first = int(np.nan_to_num(self.log_odds, nan=-math.inf).argmax()) if len(self.log_odds) else -1
@@ -361,13 +396,14 @@ class Hypotheses:
             return []
         if not self.by_checks[first] > math.log(ALTERNATIVES):
             return []
-        named = []
-        for row in self._likely(first):
-            named.append(self.name(row))
-            if np.count_nonzero(~np.isnan(self.estimate[row])) <= 1:  # With the estimate
-                size = f"{self.estimate[row, 0]:.3g}{self._unit(row)}"
-                named[-1] = phrase("common.error", named=named[-1], size=size)
-        return named
+        return [self._estimated(row) for row in self._likely(first)]
+
+    def _estimated(self, row: int) -> Phrase:
+        """Return the name of an error, with the estimate of a single component."""
+        if np.count_nonzero(~np.isnan(self.estimate[row])) > 1:
+            return self.name(row)
+        size = f"{self.estimate[row, 0]:.3g}{self._unit(row)}"
+        return phrase("common.error", named=self.name(row), size=size)
 
     @property
     def common_is_harmful(self) -> bool:

@@ -17,7 +17,7 @@
 //! | exclusion of points and photos | `screens` |
 //! | problem of least squares | `naming`, `datum`, `problem`, `layout`, `bundle`, `parameter_values` |
 //! | values and equations at given parameters | `evaluated`, `rigid_motions`, `diverging`, `corrected_images`, `composed`, `simd`, `precision`, `intersection`, `motions`, `weighted_angles` |
-//! | unknowns | `model`, `blocks`, `linearization` |
+//! | unknowns | `model`, `blocks`, `linearization_point` |
 //! | selection of the input | `check`, `selection`, `neighbourhood` |
 //! | input and errors | `error`, `interface`, `camera_priors`, `input` |
 //! | types of observations and parameters | `image_corrections`, `observations`, `mounts`, `film`, `commons` |
