@@ -1,6 +1,6 @@
 //! Rigs: several photos with individual poses on a common frame.
 
-use super::{PartialPose, PoseInputs, MountModel, Mounts};
+use super::{MountModel, Mounts, PartialPose, PoseInputs};
 use crate::network::commons::CommonKind;
 
 /// Mount of a photo that was taken by a sensor on a frame. Its pose is composed from the frame (the photo of the first sensor) and the

@@ -3,7 +3,7 @@
 use nalgebra::Matrix3xX;
 
 use super::chain::{shifting, turning};
-use super::{PartialPose, PoseInputs, MountModel, Mounts, PhotoMotion, Trajectory};
+use super::{MountModel, Mounts, PartialPose, PhotoMotion, PoseInputs, Trajectory};
 use crate::geometry::trajectory::{Flight, Motion};
 use crate::geometry::{Matrix3, Vector3};
 use crate::network::commons::CommonKind;

@@ -2,7 +2,7 @@
 
 use nalgebra::DMatrix;
 
-use super::{Named, ObservationModel, Rows, ObservationInputs, Touches, deviation};
+use super::{Named, ObservationInputs, ObservationModel, Rows, Touches, deviation};
 
 /// Two points of equal height, or with a levelled height difference.
 ///

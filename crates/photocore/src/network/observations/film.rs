@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::{Fault, Named, ObservationModel, Precision, Rows, ObservationInputs, Touches};
+use super::{Fault, Named, ObservationInputs, ObservationModel, Precision, Rows, Touches};
 use crate::network::commons::CommonKind;
 use crate::network::film::{FilmOf, Read};
 

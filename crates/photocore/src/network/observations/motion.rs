@@ -3,8 +3,8 @@
 use nalgebra::DMatrix;
 
 use super::{
-    CommonKind, Fault, Named, ObservationModel, Precision, Quantity, Rows, ObservationInputs, Touches, nine, rotates,
-    three,
+    CommonKind, Fault, Named, ObservationInputs, ObservationModel, Precision, Quantity, Rows, Touches, nine,
+    rotates, three,
 };
 use crate::geometry::{Matrix3, Vector3};
 

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, Matrix2x3, RowVector3};
 
 use super::{
-    CommonKind, Named, ObservationModel, Precision, Rows, ObservationInputs, Touches, deviation, in_own_axes, own_axes,
+    CommonKind, Named, ObservationInputs, ObservationModel, Precision, Rows, Touches, deviation, in_own_axes,
+    own_axes,
 };
 
 /// A point on a plane, or at a given distance from it; its standard deviation is the flatness of the plane.

@@ -3,8 +3,8 @@
 use nalgebra::{DMatrix, SMatrix};
 
 use super::{
-    CommonKind, Fault, Named, ObservationModel, Precision, Quantity, Rows, ObservationInputs, Touches, deviation, length,
-    nine, rotates, rows_of, three,
+    CommonKind, Fault, Named, ObservationInputs, ObservationModel, Precision, Quantity, Rows, Touches,
+    deviation, length, nine, rotates, rows_of, three,
 };
 use crate::geometry::angle_axis::{right_jacobian_inverse, rotation_angle_axis};
 use crate::geometry::{Matrix3, Pose, Vector3};

@@ -3,7 +3,8 @@
 use nalgebra::{DMatrix, SMatrix};
 
 use super::{
-    CommonKind, Named, ObservationModel, Precision, Rows, ObservationInputs, Touches, deviation, length, rows_of, three,
+    CommonKind, Named, ObservationInputs, ObservationModel, Precision, Rows, Touches, deviation, length,
+    rows_of, three,
 };
 use crate::geometry::Matrix3;
 

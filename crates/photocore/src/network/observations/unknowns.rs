@@ -2,7 +2,9 @@
 
 use nalgebra::DMatrix;
 
-use super::{CommonKind, Named, ObservationModel, Precision, Rows, ObservationInputs, Touches, deviation, length};
+use super::{
+    CommonKind, Named, ObservationInputs, ObservationModel, Precision, Rows, Touches, deviation, length,
+};
 
 /// Joint observation of shared parameters with a full covariance matrix, from a separate adjustment.
 ///
