@@ -187,7 +187,9 @@ def verdicts(_: str) -> str:
     steps: dict[str, list[str]] = {}
     exits: dict[str, set[int]] = {}
     for rule in RULES:
-        steps.setdefault(rule.code, []).extend(f"advice.{DECIDED.get(name, name)}" for name in rule.advice.split())
+        steps.setdefault(rule.code, []).extend(
+            f"advice.{DECIDED.get(name, name)}" for name in rule.advice.split()
+        )
         exits.setdefault(rule.code, set()).update({0, rule.exit} if rule.warning else {rule.exit})
     rows = []
     for name in [name for name in texts if name.startswith("verdict.")]:
