@@ -188,12 +188,7 @@ def interior_orientation(
         raise InputError(phrase("films.few-marks", model=model, **fields))
     own, machine = counted or Readings(), scanner or Scanner("scanner", sd=0.0)
     true = true_places(xy, own, machine, curves)
-    found = is_mirrored(q, true)
-    if mirrored is None and found is None:
-        raise InputError(phrase("films.unknown-side"))
-    if mirrored is not None and found is not None and found != mirrored:
-        raise ContradictionError(mirror_message(mirrored, side_residuals(q, true)))
-    side = bool(found if mirrored is None else mirrored)
+    side = _side(q, true, mirrored)
     nodes = 0 if reseau is None else len(reseau.weights)
     known, rows, size = len(names), xy.size, np.abs(q).max()
     values = np.zeros(8 + 2 * nodes)
@@ -216,15 +211,7 @@ def interior_orientation(
             mirrored=side,
             pattern=None if reseau is None else reseau.with_shifts(values[8:].reshape(-1, 2)),
         )
-        computed, partials = _photocore.film_readings(film.numbers(), _vectors(film), q)
-        misfits, matrix = (xy - computed).ravel(), partials[:, :, 2 : 2 + known].reshape(rows, known)
-        if reseau is not None:
-            cosine, sine = np.cos(values[2]), np.sin(values[2])
-            turn = np.array([[cosine, -sine], [sine, cosine]]) * [-1.0 if side else 1.0, 1.0]
-            by_shifts = np.einsum("nij,nk->nikj", partials[:, :, 2:4] @ turn, _parts(reseau, q))
-            observed = np.eye(len(columns))[known:]
-            matrix = np.vstack([np.hstack([matrix, by_shifts.reshape(rows, -1)]), observed])
-            misfits = np.concatenate([misfits, -values[8:]])
+        misfits, matrix = _equations(film, values, known, q, xy, reseau)
         scale = np.linalg.norm(matrix, axis=0)
         if not (scale > 0).all() or np.linalg.matrix_rank(matrix / scale) < len(columns):
             raise InputError(phrase("films.undetermined", model=model))
@@ -255,6 +242,33 @@ def interior_orientation(
         affine=affine,
         shifts=frozen(values[8:].reshape(-1, 2)),
     )
+
+
+def _side(places: Floats, true: Floats, mirrored: bool | None) -> bool:
+    """Return whether the film was scanned mirrored, by its marks or as given."""
+    found = is_mirrored(places, true)
+    if mirrored is None and found is None:
+        raise InputError(phrase("films.unknown-side"))
+    if mirrored is not None and found is not None and found != mirrored:
+        raise ContradictionError(mirror_message(mirrored, side_residuals(places, true)))
+    return bool(found if mirrored is None else mirrored)
+
+
+def _equations(
+    film: Film, values: Floats, known: int, places: Floats, readings: Floats, reseau: Reseau | None
+) -> tuple[Floats, Floats]:
+    """Return misfits and partials of the readings, and of observed node shifts, by all unknowns."""
+    computed, partials = _photocore.film_readings(film.numbers(), _vectors(film), places)
+    misfits = (readings - computed).ravel()
+    matrix = partials[:, :, 2 : 2 + known].reshape(len(misfits), known)
+    if reseau is None:
+        return misfits, matrix
+    cosine, sine = np.cos(values[2]), np.sin(values[2])
+    turn = np.array([[cosine, -sine], [sine, cosine]]) * [-1.0 if film.mirrored else 1.0, 1.0]
+    by_shifts = np.einsum("nij,nk->nikj", partials[:, :, 2:4] @ turn, _parts(reseau, places))
+    matrix = np.hstack([matrix, by_shifts.reshape(len(misfits), -1)])
+    observed = np.eye(matrix.shape[1])[known:]
+    return np.concatenate([misfits, -values[8:]]), np.vstack([matrix, observed])
 
 
 def true_places(
