@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import bz2
 import gzip
-import tracemalloc
+from functools import partial
 
 import pytest
 
+from peak import peak_of
 from photogram import InputError
 from photogram.collection import read
 
 HEAD = b"21 11315 36455\n"
 NUMBERS = 3 + 4 * 36455 + 9 * 21 + 3 * 11315
+
+
+def rejection(path):
+    with pytest.raises(InputError) as error:
+        read(path)
+    return error.value
 
 
 @pytest.mark.parametrize("pack", [bytes, bz2.compress, gzip.compress], ids=["plain", "bzip2", "gzip"])
@@ -23,15 +30,9 @@ NUMBERS = 3 + 4 * 36455 + 9 * 21 + 3 * 11315
 def test_a_file_longer_than_its_first_line_says(tmp_path, pack, filling, code):
     path = tmp_path / "problem"
     path.write_bytes(pack(HEAD + filling * 6_000_000))
-    tracemalloc.start()
-    try:
-        with pytest.raises(InputError) as error:
-            read(path)
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
-    assert error.value.code == code
-    fields = error.value.phrase.fields
+    error, peak = peak_of(partial(rejection, path))
+    assert error.code == code
+    fields = error.phrase.fields
     if code == "file.long-number":
         assert int(fields["length"]) > 1000
     else:
