@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import functools
+import os
 from pathlib import Path
 
 import pytest
@@ -16,8 +17,14 @@ from golden_data import shared
 from photogram import Block, simulate
 from photogram.cli import app
 
-# A busy machine is slow; what is slow by itself shows in the durations of the suite.
-settings.register_profile("photogram", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+# A busy machine is slow: the durations of the suite list slow tests. Continuous integration repeats the same
+# examples, so that a failure belongs to the change; other runs draw new ones.
+settings.register_profile(
+    "photogram",
+    deadline=None,
+    derandomize="CI" in os.environ,
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile("photogram")
 
 # The runner of typer builds all commands for every run, which takes more time than most commands need.
