@@ -22,7 +22,6 @@ from photogram.formats.csm.reading import (
     from_pixels,
     isd_of,
     not_zero,
-    read_drift,
     transformed,
 )
 from photogram.io.files import reading
@@ -225,7 +224,7 @@ def read_cube(path: Path) -> Isd:
     pointing = read_turns(label, "InstrumentPointing", path)
     rate = not_zero(instrument["LineExposureDuration"]) / 1000
     lines = Lines([[0.0, _start(instrument, keywords), rate]])
-    lines, remarks = fitting(lines, count, pointing.times, read_drift(keywords, code))
+    lines, remarks = fitting(lines, count, pointing.times, keywords, code)
     return Isd(
         path,
         "line",

@@ -23,7 +23,6 @@ from photogram.formats.csm.isd import (
 from photogram.formats.declarations import declared
 from photogram.io.places import at_place, positive
 from photogram.io.tree import Tree
-from photogram.lazy_dataclasses import dataclass
 from photogram.network.lens import Lens, LensModel
 from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import increasing, rotations
@@ -70,7 +69,7 @@ def isd_of(tree: Tree) -> Isd:
         raise tree["jitter"].error(phrase("csm.jitter"))
     if kind == "line":
         lines = read_lines(tree, center)
-        own["lines"], of_lines = fitting(lines, size[1], pointing.times, read_drift(keywords, code))
+        own["lines"], of_lines = fitting(lines, size[1], pointing.times, keywords, code)
         remarks += of_lines
     elif kind == "push frame":
         own["framelets"] = _framelets(tree, size[1], float(detector.summing[1]))
@@ -256,22 +255,6 @@ def not_zero(tree: Tree) -> float:
     return found
 
 
-@dataclass(frozen=True)
-class Drift:
-    """Corrections of line times: rate dt (1 + factor) + further, shift `lines`."""
-
-    factor: float
-    further: float
-    lines: float
-
-    def of(self, lines: Lines) -> Lines:
-        """Return the corrected times of lines."""
-        rows = np.array(lines.table)
-        rows[:, 2] = rows[:, 2] * (1 + self.factor) + self.further
-        rows[:, 1] += self.lines * rows[:, 2]
-        return Lines(rows)
-
-
 def read_lines(tree: Tree, center: float) -> Lines:
     """Return the times of lines from the upper edge."""
     rates = tree["line_scan_rate"]
@@ -282,21 +265,17 @@ def read_lines(tree: Tree, center: float) -> Lines:
         return Lines(rows - [0.5, -center, 0.0])
 
 
-def read_drift(keywords: Tree, code: str | None) -> Drift | None:
-    """Return the corrections in an instrument's keywords; None without corrections."""
-    names = [
-        f"{code}_{name}" for name in ("MULTIPLI_LINE_ERROR", "ADDITIVE_LINE_ERROR", "ADDITIONAL_PREROLL")
-    ]
-    if code is None or names[0] not in keywords:
-        return None
-    return Drift(*(keywords[name].number() for name in names))
+_DRIFT = ("MULTIPLI_LINE_ERROR", "ADDITIVE_LINE_ERROR", "ADDITIONAL_PREROLL")
+"""Keywords of an instrument: the rate of lines dt is dt (1 + first) + second, shifted by `third` lines."""
 
 
-def fitting(lines: Lines, count: int, table: Floats, drift: Drift | None) -> tuple[Lines, tuple[Phrase, ...]]:
+def fitting(
+    lines: Lines, count: int, table: Floats, keywords: Tree, code: str | None
+) -> tuple[Lines, tuple[Phrase, ...]]:
     """Return line times consistent with the pointing of the file, and remarks.
 
-    `drift` is applied if it improves the agreement with the ends of `table`, the (k,) times of the pointing:
-    rates of newer files include it.
+    The drift in the keywords of an instrument is applied if it improves the agreement with the ends of
+    `table`, the (k,) times of the pointing: rates of newer files include it.
     """
     ends = table[[0, -1]]
 
@@ -304,9 +283,14 @@ def fitting(lines: Lines, count: int, table: Floats, drift: Drift | None) -> tup
         return float(np.abs(np.sort(own.times([0.0, count])) - ends).max())
 
     remarks = []
-    if drift is not None and misfit(drift.of(lines)) < misfit(lines):
-        lines = drift.of(lines)
-        remarks.append(phrase("csm.drift", rate=float(np.asarray(lines.table)[0, 2])))
+    if code is not None and f"{code}_{_DRIFT[0]}" in keywords:
+        factor, further, shift = (keywords[f"{code}_{name}"].number() for name in _DRIFT)
+        rows = np.array(lines.table)
+        rows[:, 2] = rows[:, 2] * (1 + factor) + further
+        rows[:, 1] += shift * rows[:, 2]
+        if misfit(drifted := Lines(rows)) < misfit(lines):
+            lines = drifted
+            remarks.append(phrase("csm.drift", rate=float(rows[0, 2])))
     span, known = float(abs(np.diff(lines.times([0.0, count]))[0])), float(ends[1] - ends[0])
     if known > 0 and abs(span - known) > APART * known:
         percent = 100 * abs(span - known) / max(span, known)
