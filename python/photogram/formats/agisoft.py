@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -40,14 +39,6 @@ _TERMS = ("f", "cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3",
 _Similarity = tuple[Floats, Floats, float]  # R, T, s of X_world = s R X_chunk + T
 
 
-class _Reference(NamedTuple):
-    """The reference of a camera or marker; standard deviations of 0 or NaN are unknown."""
-
-    xyz: Floats
-    sd: Floats
-    enabled: bool
-
-
 def read(path: Path, options: ReadOptions) -> Project:
     """Read the first or the requested chunk of a document."""
     root = read_stream(path, {}, "document")
@@ -76,13 +67,12 @@ def read(path: Path, options: ReadOptions) -> Project:
         np.broadcast_to(options.sd.get(kind, (settings.get(f"accuracy_{name}", np.nan),)), 3)
         for kind, name in (("gnss", "cameras"), ("control", "markers"))
     )
+    references = {shot.attributes["id"]: (shot, _reference(shot, gnss_sd)) for shot in shots}
     lost = 0
-    for shot in shots if system is not None else ():
-        if (reference := _reference(shot, gnss_sd)) is not None and reference.enabled:
-            if (reference.sd > 0).all():
-                block.gnss(shot.attributes["id"], reference.xyz, reference.sd, shot, crs=system or "")
-            else:
-                lost += 1
+    for key, (shot, (xyz, sd, enabled)) in references.items() if system is not None else ():
+        if enabled and (sd > 0).all():
+            block.gnss(key, xyz, sd, shot, crs=system or "")
+        lost += enabled and not (sd > 0).all()
     if lost:
         block.lacks.append(Phrase("read.references", {"number": lost, "option": option_sd("gnss")}))
     _markers(chunk, block, markers, system, control_sd)
@@ -189,7 +179,7 @@ def _with_poses(
         matrices[row] = rotation @ turn @ Y_DOWN
         centres[row] = scale * rotation @ values[:3, 3] + translation
     system = chunk.word("reference")
-    given = [own.xyz for each in (*shots, *markers) if (own := _reference(each, np.ones(3))) is not None]
+    given = [own for each in (*shots, *markers) if not np.isnan(own := _reference(each, np.ones(3))[0]).any()]
     # A world is geocentric, judged by its size, its system or the range of its references.
     degrees = np.abs(np.array(given).reshape(-1, 3)[:, :2]) <= (360.0, 90.0)
     far = np.linalg.norm(centres.mean(axis=0)) >= GEOCENTRIC and not system.upper().startswith(LOCAL)
@@ -208,11 +198,11 @@ def _with_poses(
     return None
 
 
-def _reference(element: Element, default: Floats) -> _Reference | None:
-    """Return a reference; None if missing."""
+def _reference(element: Element, default: Floats) -> tuple[Floats, Floats, bool]:
+    """Return position (NaN if missing), standard deviations (0 or NaN if unknown), and whether it is used."""
     own = element.child("reference")
     if own is None or any(axis not in own.attributes for axis in "xyz"):
-        return None
+        return np.full(3, np.nan), default, False
     position = np.array([own.attribute(axis) for axis in "xyz"])
     sd = default.copy()
     # One for all axes, one for both horizontal coordinates, or one for each: the most detailed one is used.
@@ -220,7 +210,7 @@ def _reference(element: Element, default: Floats) -> _Reference | None:
         if name in own.attributes:
             sd[:axes] = own.attribute(name)
     sd = np.array([own.attribute(f"s{axis}", float(sd[k])) for k, axis in enumerate("xyz")])
-    return _Reference(position, sd, own.attributes.get("enabled", "true").lower() not in ("false", "0"))
+    return position, sd, own.attributes.get("enabled", "true").lower() not in ("false", "0")
 
 
 def _markers(
@@ -231,10 +221,9 @@ def _markers(
         key = marker.attributes.get("id", "")
         name = marker.attributes.get("label") or f"marker {row}"
         block.point(key, marker, name=name)
-        reference = _reference(marker, default)
-        if system is None or reference is None:
+        xyz, sd, enabled = _reference(marker, default)
+        if system is None or np.isnan(xyz).any():
             continue
-        xyz, sd, enabled = reference
         if not enabled:
             block.control(key, xyz, np.where(sd > 0, sd, np.nan), marker, crs=system, check=True)
         elif not (sd > 0).all():
@@ -274,8 +263,13 @@ def write(project: Project) -> Mapping[str, bytes]:
     block = project.block
     if not known_poses(block).any():
         raise InputError(phrase("format.poses"))
-    world = _world(project.frame)
-    system = (world.crs or LOCAL_SYSTEM).replace('"', "&quot;")
+    frame, rotation, translation = project.frame, np.eye(3), np.zeros(3)
+    if frame.origin is not None:
+        from photogram.formats.crs import east_north_up, from_frame
+
+        rotation = east_north_up(frame.origin).T
+        translation = from_frame(EARTH, np.zeros((1, 3)), np.zeros((1, 3, 3)), frame)[0][0]
+    system = (GEOGRAPHIC if _is_placed(frame) else LOCAL_SYSTEM).replace('"', "&quot;")
     cameras, which = known_cameras(block)
     sensors = enumerate(zip(cameras, project.sizes, project.pixel_mm, strict=True))
     lines = [
@@ -287,12 +281,12 @@ def write(project: Project) -> Mapping[str, bytes]:
         "</sensors>",
         '<components next_id="1" active_id="0">',
         '<component id="0" label="Component 1">',
-        f"<transform><rotation>{_numbers(world.rotation)}</rotation>"
-        f"<translation>{_numbers(world.translation)}</translation><scale>1.0</scale></transform>",
+        f"<transform><rotation>{_numbers(rotation)}</rotation>"
+        f"<translation>{_numbers(translation)}</translation><scale>1.0</scale></transform>",
         "</component>",
         "</components>",
-        *_written_shots(project, world, which),
-        *_written_markers(project, world),
+        *_written_shots(project, which),
+        *_written_markers(project),
         f"<reference>{system}</reference>",
         "</chunk>",
         "</document>",
@@ -301,33 +295,17 @@ def write(project: Project) -> Mapping[str, bytes]:
     return {FORMATS["agisoft"].files[0]: "\n".join(lines).encode()}
 
 
-class _World(NamedTuple):
-    """The transformation X_world = R X + T of the chunk, and the system of references; empty: local."""
-
-    rotation: Floats
-    translation: Floats
-    crs: str
-    frame: Frame
-
-    def references(self, xyz: Floats, covariances: Floats) -> tuple[Floats, Floats]:
-        """Return positions and standard deviations in the reference system."""
-        if self.crs and len(xyz):
-            from photogram.formats.crs import from_frame
-
-            xyz, covariances = from_frame(self.crs, xyz, covariances, self.frame)
-        return xyz, np.sqrt(np.einsum("nii->ni", covariances))
+def _is_placed(frame: Frame) -> bool:
+    return frame.kind == "geocentric" or frame.origin is not None
 
 
-def _world(frame: Frame) -> _World:
-    if frame.kind == "cartesian" or (frame.kind == "topocentric" and frame.origin is None):
-        return _World(np.eye(3), np.zeros(3), "", frame)
-    from photogram.formats.crs import east_north_up, from_frame
+def _references(frame: Frame, xyz: Floats, covariances: Floats) -> tuple[Floats, Floats]:
+    """Return positions and standard deviations in the system of references."""
+    if _is_placed(frame) and len(xyz):
+        from photogram.formats.crs import from_frame
 
-    rotation, translation = np.eye(3), np.zeros(3)
-    if frame.origin is not None and frame.kind == "topocentric":
-        rotation = east_north_up(frame.origin).T
-        translation = from_frame(EARTH, np.zeros((1, 3)), np.zeros((1, 3, 3)), frame)[0][0]
-    return _World(rotation, translation, GEOGRAPHIC, frame)
+        xyz, covariances = from_frame(GEOGRAPHIC, xyz, covariances, frame)
+    return xyz, np.sqrt(np.einsum("nii->ni", covariances))
 
 
 def _numbers(values: Floats) -> str:
@@ -363,11 +341,12 @@ def _calibration(camera: Camera, size: Size | None) -> tuple[str, Mapping[str, f
     return "frame", values | terms | {"p1": terms["p2"], "p2": terms["p1"]}
 
 
-def _written_shots(project: Project, world: _World, which: list[int]) -> list[str]:
+def _written_shots(project: Project, which: list[int]) -> list[str]:
     block = project.block
     turns = attitude_matrices(block) @ Y_DOWN
     given = block.observations.of_type(Position)
-    positions, sd = world.references(
+    positions, sd = _references(
+        project.frame,
         np.array([each.observed[:3] for each in given]).reshape(-1, 3),
         np.array([each.precision for each in given]).reshape(-1, 3, 3),
     )
@@ -405,12 +384,12 @@ def _complete(known: KnownPoints) -> Bools:
     return np.asarray(np.isfinite(known.positions).all(axis=1) & held)
 
 
-def _written_markers(project: Project, world: _World) -> list[str]:
+def _written_markers(project: Project) -> list[str]:
     known = known_points(project)
     own = np.flatnonzero(_complete(known)).tolist()
     if not own:
         return []
-    positions, deviations = world.references(known.positions[own], known.covariances[own])
+    positions, deviations = _references(project.frame, known.positions[own], known.covariances[own])
     lines = [f'<markers next_id="{len(own)}" next_group_id="0">']
     for k, (row, sd) in enumerate(zip(own, deviations, strict=True)):
         name = quoteattr(project.block.point_ids[known.rows[row]])

@@ -63,3 +63,10 @@ def one_file(path: Path, suffix: str) -> Path | None:
             phrase("format.several", name=suffix, names=[file.name for file in found]), file=path
         )
     return found[0] if found else None
+
+
+def file_of(path: Path, suffix: str) -> Path:
+    """Return a file, or the only file of a suffix in a folder."""
+    if (found := one_file(path, suffix) if path.is_dir() else path) is None:
+        raise InputError(phrase("format.files", name=f"*{suffix}"), file=path)
+    return found

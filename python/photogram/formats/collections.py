@@ -71,9 +71,7 @@ def read_bal(path: Path, options: ReadOptions) -> Project:
 
     del options
     found = bal.read(path, pieces(path))
-    return project_of(
-        found, path, FORMATS["bal"].title, [str(row) for row in range(len(found.photo_parameters))]
-    )
+    return project_of(found, path, FORMATS["bal"].title, range(len(found.photo_parameters)))
 
 
 def write_bal(project: Project) -> Mapping[str, bytes]:
@@ -83,26 +81,23 @@ def write_bal(project: Project) -> Mapping[str, bytes]:
     return {PROBLEM: bal.to_bytes(collection_of(project)[0])}
 
 
-def project_of(found: Collection, path: Path, title: str, names: Sequence[str]) -> Project:
+def project_of(found: Collection, path: Path, title: str, names: Sequence[str | int]) -> Project:
     """Return the project of a collection without unregistered photos (f is 0)."""
     registered = found.photo_parameters[:, 6] != 0
-    rows = np.flatnonzero(registered)
     block = BlockBuilder(path, title)
-    if len(rows) < len(registered):
-        lost = [names[row] for row in np.flatnonzero(~registered).tolist()]
-        block.messages.append(Message(phrase("format.unposed", n=len(lost), names=lost)))
-    parameters = found.photo_parameters[rows]
+    if lost := [str(name) for name, there in zip(names, registered, strict=True) if not there]:
+        block.messages.append(Message.of("format.unposed", n=len(lost), names=lost))
+    parameters = found.photo_parameters[registered]
     to_photo = _photocore.vector_rotations(np.ascontiguousarray(parameters[:, :3]))
-    places = np.full(len(registered), -1, dtype=np.int64)
-    places[rows] = np.arange(len(rows))
-    block.messages.append(Message(phrase("bundler.cameras")))
-    names = [names[row] for row in rows.tolist()]
-    for name, (f, k1, k2) in zip(names, parameters[:, 6:].tolist(), strict=True):
+    block.messages.append(Message.of("bundler.cameras"))
+    photos = [str(name) for name, there in zip(names, registered, strict=True) if there]
+    for name, (f, k1, k2) in zip(photos, parameters[:, 6:].tolist(), strict=True):
         block.camera(Camera("bal", {"f": f, "k1": k1, "k2": k2}, name=name))
     centres = -np.einsum("nji,nj->ni", to_photo, parameters[:, 3:6])
-    block.photos(names, np.arange(len(rows)), centres, to_photo.transpose(0, 2, 1))
+    block.photos(photos, np.arange(len(photos)), centres, to_photo.transpose(0, 2, 1))
     block.points(list(map(str, range(len(found.point_positions)))), np.array(found.point_positions))
-    block.images(places[found.image_photos], found.image_points, np.array(found.image_xy))
+    rows = np.where(registered, np.cumsum(registered) - 1, -1)
+    block.images(rows[found.image_photos], found.image_points, np.array(found.image_xy))
     block.lacks.append(Phrase("read.placeless", {"option": Phrase("option.control")}))
     return block.project()
 
@@ -121,11 +116,7 @@ def _reduced(camera: Camera, size: Size | None) -> tuple[float, float, float] | 
         return values["f"], values["k1"], values["k2"]
     if camera.model == "perspective":
         return -values["c"], 0.0, 0.0
-    if (
-        camera.model == "radial"
-        and size is not None
-        and (values["cx"], values["cy"]) == (size[0] / 2, size[1] / 2)
-    ):
+    if camera.model == "radial" and size and (values["cx"], values["cy"]) == (size[0] / 2, size[1] / 2):
         return values["f"], values["k1"], values["k2"]
     return None
 
@@ -134,32 +125,29 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
     """Return the collection of a project, and the names of its photos."""
     from photogram.collection.collection import Collection
 
-    block = project.block
+    block, positions, oriented = project.block, complete_positions(project), known_poses(project.block)
     cameras, photo_cameras = known_cameras(block)
-    sizes = project.sizes
-    positions = complete_positions(project)
     placed: Bools = np.asarray(np.isfinite(positions).all(axis=1))
-    oriented = known_poses(block)
     rows = np.flatnonzero(oriented[block.image_photos] & placed[block.image_points])
     if not len(rows):
         raise InputError(phrase("format.no-images"))
     # Image coordinates from the centre, reduced to f, k1, k2
-    xy, directions = block.image_xy.copy(), image_directions(block)
-    for row, (camera, size) in enumerate(zip(cameras, sizes, strict=True)):
-        own = np.asarray(photo_cameras)[block.image_photos] == row
-        if _reduced(camera, size) is None:
+    xy, directions, lenses = (
+        block.image_xy.copy(),
+        image_directions(block),
+        list[tuple[float, float, float]](),
+    )
+    for row, (camera, size) in enumerate(zip(cameras, project.sizes, strict=True)):
+        own, lens = np.asarray(photo_cameras)[block.image_photos] == row, _reduced(camera, size)
+        lenses.append(lens or (camera.scale, 0.0, 0.0))
+        if lens is None:
             with np.errstate(divide="ignore", invalid="ignore"):
                 xy[own] = -camera.scale * directions[own, :2] / directions[own, 2:]
         elif camera.model == "radial" and size is not None:
             xy[own] = np.column_stack([xy[own, 0] - size[0] / 2, size[1] / 2 - xy[own, 1]])
     rows = rows[np.isfinite(xy[rows]).all(axis=1)]
-    photos, points = np.flatnonzero(oriented), np.flatnonzero(placed)
-    of_photo, of_point = np.full(len(oriented), -1), np.full(len(placed), -1)
-    of_photo[photos], of_point[points] = np.arange(len(photos)), np.arange(len(points))
+    photos, of_photo, of_point = np.flatnonzero(oriented), np.cumsum(oriented) - 1, np.cumsum(placed) - 1
     to_photo = attitude_matrices(block)[photos].transpose(0, 2, 1)
-    lenses = [
-        _reduced(each, size) or (each.scale, 0.0, 0.0) for each, size in zip(cameras, sizes, strict=True)
-    ]
     parameters = np.hstack(
         [
             _photocore.rotation_vectors(np.ascontiguousarray(to_photo)),
@@ -169,7 +157,7 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
     )
     found = Collection(
         photo_parameters=parameters,
-        point_positions=positions[points],
+        point_positions=positions[placed],
         image_photos=of_photo[block.image_photos[rows]],
         image_points=of_point[block.image_points[rows]],
         image_xy=xy[rows],

@@ -30,8 +30,6 @@ def _declared() -> dict[str, dict[str, str]]:
 
 WORDS = _declared()  # Meanings of words by kind
 _KNOWN, _KNOWN_ROLES, _TOGETHER = (WORDS[kind] for kind in ("column", "role", "accuracy"))
-PHOTO_WORDS = WORDS["photo"].keys()  # Headings of the column of photos
-PIXEL_WORDS = WORDS["pixel"]  # Headings of image coordinates, in columns and rows
 _METRES: Mapping[float, str] = {
     1.0: "m, meter, metre, meters, metres",
     1000.0: "km",
@@ -114,6 +112,11 @@ def column_of(heading: str) -> str | None:
                 if own in ("x", "y", "z"):
                     return f"sd_{own}"
     return _meaning(words)
+
+
+def is_photo(heading: str) -> bool:
+    """Return whether a heading is the column of photos."""
+    return " ".join(words_of(heading)) in WORDS["photo"]
 
 
 def is_angular(heading: str) -> bool:

@@ -13,13 +13,13 @@ from photogram.errors import InputError
 from photogram.formats.column_words import (
     ANGULAR,
     KINDS_OF_UNITS,
-    PHOTO_WORDS,
-    PIXEL_WORDS,
     ROLE,
+    WORDS,
     bare_name,
     column_of,
     coverage_of,
     is_angular,
+    is_photo,
     role_of,
     units_of,
     words_of,
@@ -55,8 +55,10 @@ _DMS = re.compile(
 )
 
 
-def degrees(text: str) -> float:
-    """Return degrees from spellings such as `47 22 12.3` or `8°32'24.5" W`."""
+def degrees(text: str, other: str = "") -> float:
+    """Return degrees from spellings such as `47 22 12.3` or `8°32'24.5" W`; reject `other` letters."""
+    if any(letter in text for letter in other):
+        raise ValueError(f"{quoted(text)} must not have a letter of the other axis")
     match = _DMS.fullmatch(text.strip())
     before, sign, *parts, behind = match.groups() if match else ("", "", "", "")
     values = [float(part.replace(",", ".")) for part in parts if part]
@@ -105,7 +107,7 @@ class Columns:
             if "photo" in known and (is_photo(heading) or (column == "point" and "point" not in known)):
                 column = "photo"
             elif column not in known:
-                column = PIXEL_WORDS.get(" ".join(words_of(heading)), column)
+                column = WORDS["pixel"].get(" ".join(words_of(heading)), column)
             fits = (column in known and (column != ROLE or "cov_xz" in known)) or (
                 column == "sd_xy" and "sd_x" in known
             )
@@ -116,11 +118,6 @@ class Columns:
 
 
 PLAIN = Columns()
-
-
-def is_photo(heading: str) -> bool:
-    """Return whether a heading is the column of photos."""
-    return " ".join(words_of(heading)) in PHOTO_WORDS
 
 
 def _places(heading: str, own: Sequence[str]) -> list[int]:
@@ -194,8 +191,8 @@ def settled(
     for column, own in table.headings:
         heading = columns.headings.get(column, own)
         if column in ("x", "y") and is_angular(own):
-            letters = "NS" if column == "x" else "EW"
-            cells[column] = table.numbers(column, read=partial(_on_axis, letters))
+            read = partial(degrees, other="NS" if column == "x" else "EW")
+            cells[column] = table.numbers(column, read=read)
         if column == "sd_xy":
             cells["sd_x"] = cells["sd_y"] = table.numbers(column, infinite=True)
         elif column in ("x", "y", "z") and heading.startswith("-") and heading.lower() != own:
@@ -230,14 +227,8 @@ def in_units(
         words = [word for word in units_of(heading) if word in known or not _has_notes(column, own, word)]
         for word in words[:1]:
             if word not in known:
-                raise table.head.error(
-                    phrase(
-                        "columns.unit" if known else "columns.no-unit",
-                        column=own,
-                        unit=word,
-                        names=list(known),
-                    )
-                )
+                code = "columns.unit" if known else "columns.no-unit"
+                raise table.head.error(phrase(code, column=own, unit=word, names=list(known)))
             factor = known[word] / size
             parts.append(phrase("columns.in", unit=word))
         if (coverage := coverage_of(own)) is not None:
@@ -274,12 +265,6 @@ def heading_of(table: ColumnTable, column: str) -> str:
     return dict(table.headings).get(column) or column
 
 
-def _on_axis(other: str, text: str) -> float:
-    if any(letter in text for letter in other):
-        raise ValueError(f"{quoted(text)} must not have a letter of the other axis")
-    return degrees(text)
-
-
 def _with_points(table: ColumnTable, names: Collection[str], messages: list[Message]) -> ColumnTable:
     """Select the column of names with the most observed points."""
     found = [
@@ -312,7 +297,7 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
         own, meaning = headings[column], column_of(headings[column])
         sure = column == ROLE and (ROLE in columns.headings or not _PLAIN_ROLES.isdisjoint(words_of(own)))
         if meaning in _FLAGS and not any(found):
-            words[column] = [_flag(table, column, row, meaning) for row in range(table.count)]
+            words[column] = [_flag(table, row, cell.lower(), meaning) for row, cell in enumerate(cells)]
         # Other types describe something else; columns without a heading of roles contain "check".
         elif (sure or any(found)) and (named or "check" in found):
             words[column] = found
@@ -330,8 +315,7 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
     return table.renamed({column: ROLE}).with_texts(ROLE, uses)
 
 
-def _flag(table: ColumnTable, column: str, row: int, meaning: str) -> str:
-    word = table.texts(column)[row].lower()
+def _flag(table: ColumnTable, row: int, word: str, meaning: str) -> str:
     if word in TRUE | _MARKED:
         return "check" if meaning == "check" else "control"
     if word in FALSE or not word:
@@ -363,16 +347,17 @@ def check_unread(
     numbers = [
         own
         for column, own in others
-        if column not in columns.ignored
+        if name in STRICT
+        and column not in columns.ignored
         and column_of(own) not in ("", "point")
         and _is_numeric(table, column)
     ]
-    if numbers and name in STRICT:
+    if numbers:
         ignored = ",".join(f"-={own}" for own in numbers)
         unread = phrase("columns.numbers", names=numbers, option=guess(table, known), ignored=ignored)
         raise table.head.error(unread)
-    unread = phrase("columns.unread", table=name, names=[own for _, own in others])
-    if others and (remark := Message(unread, table.path)) not in messages:
+    remark = Message.of("columns.unread", table.path, table=name, names=[own for _, own in others])
+    if others and remark not in messages:
         messages.append(remark)
 
 

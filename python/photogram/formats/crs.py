@@ -126,12 +126,14 @@ def _geocentric_of(origin: tuple[float, float, float]) -> Floats:
 
 def amid(crs: str, xyz: Floats) -> tuple[float, float, float]:
     """Return the rounded latitude, longitude and height of the mean of positions."""
-    middle = _transformed(GEOCENTRIC, GEOGRAPHIC, geocentric(crs, xyz).mean(axis=0)[np.newaxis])[0]
-    return (
-        round(float(middle[1]), ORIGIN_DECIMALS),
-        round(float(middle[0]), ORIGIN_DECIMALS),
-        float(round(middle[2])),
-    )
+    middle = geocentric(crs, xyz).mean(axis=0)[np.newaxis]
+    longitude, latitude, height = _transformed(GEOCENTRIC, GEOGRAPHIC, middle)[0].tolist()
+    return round(latitude, ORIGIN_DECIMALS), round(longitude, ORIGIN_DECIMALS), float(round(height))
+
+
+def in_degrees(xyz: Floats, geographic: bool = True) -> Floats:
+    """Return (n, 3) positions with longitudes and latitudes in degrees if they are geographic."""
+    return np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]]) if geographic else xyz
 
 
 def to_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[Floats, Floats, list[Phrase]]:
@@ -204,9 +206,7 @@ def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
     and up at each position.
     """
     if frame.kind in ("cartesian", "geographic") and frame.crs == crs and crs:
-        own = (
-            np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]]) if frame.kind == "geographic" else xyz.copy()
-        )
+        own = in_degrees(xyz.copy(), frame.kind == "geographic")
         return own, np.broadcast_to(np.eye(3), (len(xyz), 3, 3)).copy()
     earth, own = _on_earth(xyz, frame)
     if (local := enu_origin(crs)) is not None:
@@ -253,8 +253,7 @@ def _on_earth(xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
     if frame.kind == "geocentric":
         return xyz, np.broadcast_to(np.eye(3), (len(xyz), 3, 3))
     if frame.kind == "geographic":
-        degrees = np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]])
-        return geocentric(_geographic(frame), degrees), local_frames(xyz)
+        return geocentric(_geographic(frame), in_degrees(xyz)), local_frames(xyz)
     earth = geocentric(frame.crs, xyz)
     return earth, _axes(frame.crs, xyz, earth)
 

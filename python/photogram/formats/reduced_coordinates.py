@@ -15,7 +15,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.cards import END, Card, cards, one_file
+from photogram.formats.cards import END, Card, cards, file_of, one_file
 from photogram.formats.description import agreement
 from photogram.formats.format import FORMATS
 from photogram.formats.images import checked_rotation
@@ -199,10 +199,8 @@ DIGITS = 6  # Digits of principal distances in millimetres; files have three of 
 
 def read_patb(path: Path, options: ReadOptions) -> Project:
     """Read the image file, and orientation, control and names if present."""
-    folder = path if path.is_dir() else path.parent
-    images = path if path.is_file() else one_file(folder, IMAGES)
-    if images is None:
-        raise InputError(phrase("format.files", name=f"*{IMAGES}"), file=path)
+    images = file_of(path, IMAGES)
+    folder = images.parent
     block = ReducedBuilder(images, FORMATS["patb"].title, options, read_names(folder / NAMES))
 
     def add(photo: str, card: Card) -> None:

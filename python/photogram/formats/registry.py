@@ -220,12 +220,13 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
     found += [] if chosen.holds is None else lost(fitting, chosen.holds)
     found += chosen.cannot_hold(fitting)
     if chosen.name != "plain":
-        found += parts_of_asked(project.statement)
+        moments = sum(each.moment is not None for each in project.block.observations)
         counts = {
             "features": len(project.features),
             "trajectories": len(project.block.timed),
-            "moments": sum(each.moment is not None for each in project.block.observations),
+            "moments": moments,
         }
+        found += parts_of_asked(project.statement)
         found += [phrase(f"lost.{part}", n=n) for part, n in counts.items() if n]
     return [str(part) for part in [*found, *(nominal_pixels(project) if chosen.pixels else [])]]
 

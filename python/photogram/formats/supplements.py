@@ -95,11 +95,10 @@ def with_repeated(project: Project) -> Project:
     np.add.at(mean, place, others)
     mean /= count
     sd = block.image_sd[rows]
-    spread = (((own - mean) / sd) ** 2).sum() + (((others - mean[place]) / sd[place]) ** 2).sum()
+    spread = float((((own - mean) / sd) ** 2).sum() + (((others - mean[place]) / sd[place]) ** 2).sum())
     xy, deviations = block.image_xy.copy(), np.array(block.image_sd)
     xy[rows], deviations[rows] = mean, sd / np.sqrt(count)
     said = [each for each in project.messages if each.code != "read.repeated"]
-    spread = float(spread)
     said.append(Message.of("read.averaged", n=len(second), spread=spread, half=spread / 2))
     block = block.replace(image_xy=xy, image_sd=deviations)
     return project.replace(block=block, messages=tuple(said), repeated=Repeated())
@@ -118,24 +117,14 @@ def repeated_remarks(project: Project, result: Result) -> list[Message]:
     first, second = first[used], second[used]
     residuals = project.repeated.xy[second] - block.image_xy[first] + result.residuals[first]
     more = float(((residuals / block.image_sd[first]) ** 2).sum())
-    total = result.sums_of_squares.total
-    return [
-        Message.of(
-            "result.repeated",
-            n=len(first),
-            more=total + more,
-            total=float(total),
-            option=Phrase("option.repeated"),
-        )
-    ]
+    total, option = float(result.sums_of_squares.total), Phrase("option.repeated")
+    return [Message.of("result.repeated", n=len(first), more=total + more, total=total, option=option)]
 
 
 def _repeated_rows(project: Project) -> tuple[Indices, Indices]:
     """Return rows of first observations in the block, and of their repetitions."""
     block, again = project.block, project.repeated
-    if not again.points:
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    place = _image_rows(block)
+    place = _image_rows(block) if again.points else {}
     pairs = [place.get(pair, -1) for pair in zip(again.photos, again.points, strict=True)]
     rows = np.array(pairs, dtype=np.int64)
     there = np.flatnonzero(rows >= 0)
@@ -161,31 +150,26 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
     wanted = {name.lower() for name in names}
     cameras, used, messages = [], set(), []
     titles_by_text: dict[str, list[str]] = {}
-    sizes = dict(enumerate(project.sizes))
-    for row, camera in enumerate(project.block.cameras):
+    for camera, size in zip(project.block.cameras, project.sizes, strict=True):
         model = with_parameters(camera, wanted)
         free = set(model.names) - model.constants
         unknown = freed(model, {name.lower() for name in free} if "all" in wanted else wanted)
         cameras.append(unknown)
         if "fx" in free and "f" in wanted and not wanted & {"fx", "fy", "all"}:
-            size = sizes.get(row) if unknown.unit == "px" else None
-            cameras[-1] = with_one_focal_length(unknown, size)
+            cameras[-1] = with_one_focal_length(unknown, size if unknown.unit == "px" else None)
             text = focal_length_message(unknown, cameras[-1])
             titles_by_text.setdefault(text, []).append(camera.title)
         used |= {matching_word(name, wanted) for name in free}
         if model.model != camera.model:
             fields = {"camera": camera.title, "model": model.model, "former": camera.model}
-            messages.append(Message(phrase("plain.model-replaced", **fields)))
-    messages += [
-        Message(phrase("plain.focal-length", names=titles, message=text))
-        for text, titles in titles_by_text.items()
-    ]
+            messages.append(Message.of("plain.model-replaced", **fields))
+    for text, titles in titles_by_text.items():
+        messages.append(Message.of("plain.focal-length", names=titles, message=text))
     if missing := sorted(wanted - used - {"all"}):
         names = sorted({name for camera in project.block.cameras for name in camera.names})
         raise InputError(phrase("error.unknown", kind="parameter of a camera", name=missing[0], names=names))
-    return project.replace(
-        block=project.block.replace(cameras=cameras), messages=(*project.messages, *messages)
-    )
+    messages = (*project.messages, *messages)
+    return project.replace(block=project.block.replace(cameras=cameras), messages=messages)
 
 
 def held_points(project: Project, wanted: Sequence[str]) -> Project:
@@ -252,22 +236,20 @@ def _with_list(project: Project, given: ControlList) -> Project:
     exact, plain = set(project.block.photo_ids), dict[str, list[str]]()
     for name in project.block.photo_ids:
         plain.setdefault("_".join(name.split()), []).append(name)
+    listed = given.images.texts("photo")
     photos = [
-        name if name in exact else plain[name][0] if len(plain.get(name, ())) == 1 else ""
-        for name in given.images.texts("photo")
+        name if name in exact else plain[name][0] if len(plain.get(name, ())) == 1 else "" for name in listed
     ]
     rows = [row for row, name in enumerate(photos) if name]
-    if len(rows) < len(photos):
-        pairs = zip(given.images.texts("photo"), photos, strict=True)
-        lost = sorted({own for own, name in pairs if not name})
-        given.messages.append(Message(phrase("plain.other-photos", names=lost), given.images.path))
+    if lost := sorted({own for own, name in zip(listed, photos, strict=True) if not name}):
+        given.messages.append(Message.of("plain.other-photos", given.images.path, names=lost))
     table = given.images.some(rows).with_texts("photo", [photos[row] for row in rows])
     known, points = _image_rows(project.block), table.texts("point")
     images = dict(enumerate(zip(table.texts("photo"), points, strict=True)))
     present = {row for row, image in images.items() if image in known}
     if present:
-        there, listed = to_corner(project), corner_of(table, None)
-        present = {row for row in present if np.abs(there[known[images[row]]] - listed[row]).max() <= SAME}
+        there, corner = to_corner(project), corner_of(table, None)
+        present = {row for row in present if np.abs(there[known[images[row]]] - corner[row]).max() <= SAME}
     other = project.tracks.intersection(given.control.texts("point")) - {points[row] for row in present}
     if other:
         new = {name: f"track {name}" for name in project.block.point_ids if name in other}
@@ -275,8 +257,8 @@ def _with_list(project: Project, given: ControlList) -> Project:
         for name in new:
             while new[name] in taken:
                 new[name] = f"track {new[name]}"
-        message = phrase("plain.renamed-tracks", n=len(new), names=list(new.values()))
-        given.messages.append(Message(message, table.path))
+        message = Message.of("plain.renamed-tracks", table.path, n=len(new), names=list(new.values()))
+        given.messages.append(message)
         project = with_other_names(project, new)
     further = table.some([row for row in range(table.count) if row not in present])
     return _with_table(project, table.path, further, None)
@@ -294,15 +276,8 @@ def with_control(
 
     listed = read_control_list(path, project)
     crs = crs or (listed.crs if listed else "")
-    settings = Settings(
-        path,
-        frame=project.frame,
-        length=project.block.linear_unit,
-        sd=sd,
-        tables={"control": path},
-        crs={"control": crs} if crs else {},
-        columns={"control": columns},
-    )
+    own = {"tables": {"control": path}, "crs": {"control": crs} if crs else {}, "columns": {"control": columns}}
+    settings = Settings(path, frame=project.frame, length=project.block.linear_unit, sd=sd, **own)
     tables = Tables(settings, listed.messages if listed else [], frozenset(project.block.point_ids))
     table = listed.control if listed else tables.rows("control")
     project = _with_list(project, listed) if listed else project
@@ -321,12 +296,8 @@ def with_control(
     raw = table.vectors("xyz")
     messages += check_systems(project, settings, table, targets, raw[rows], free=is_free(project))
     held = [row for row in rows if np.isfinite(given.positions[row]).all()]
-    moved = _carried(
-        project,
-        np.array([places[given.names[row]] for row in held], dtype=np.int64),
-        given.positions[held],
-        transform.frame,
-    )
+    points = np.array([places[given.names[row]] for row in held], dtype=np.int64)
+    moved = _carried(project, points, given.positions[held], transform.frame)
     block = moved.block
     positions, deviation = block.point_positions.copy(), block.point_sd.copy()
     positions[targets], deviation[targets] = given.positions[rows], given.sd[rows]
@@ -336,6 +307,9 @@ def with_control(
     full = [each for each in given.observed if each.points[0] in places]
     for each in full:
         positions[places[each.points[0]]] = np.nan
+    # Data given now are not missing any more.
+    is_given = bool(full) or np.isfinite(deviation).any()
+    options = OPTIONS_OF_CONTROL if is_given else ()
     found = moved.replace(
         block=block.replace(
             point_positions=positions,
@@ -346,36 +320,24 @@ def with_control(
         statement=with_cover(project.statement, given.names, given.vegetated.intersection(places)),
         messages=(*messages, *moved.messages[len(project.messages) :]),
         control_crs=settings.crs.get("control", ""),
-        # Data given now are not missing any more.
-        lacks=tuple(
-            each
-            for each in moved.lacks
-            if not (full or np.isfinite(deviation).any())
-            or each.fields.get("option") not in OPTIONS_OF_CONTROL
-        ),
+        lacks=tuple(each for each in moved.lacks if each.fields.get("option") not in options),
     )
-    planes = [
-        each for each in plane_remarks(found.block, found.path, found.starts) if each not in found.messages
-    ]
-    return found.replace(messages=(*found.messages, *planes))
+    planes = plane_remarks(found.block, found.path, found.starts)
+    new = [each for each in planes if each not in found.messages]
+    return found.replace(messages=(*found.messages, *new))
 
 
-def _carried(
-    project: Project, points: np.ndarray[tuple[int], np.dtype[np.int64]], targets: Floats, frame: Frame
-) -> Project:
+def _carried(project: Project, points: Indices, targets: Floats, frame: Frame) -> Project:
     """Transform a free model to control if the fit improves enough."""
-    block = project.block
     model = project.starts[points].copy()
     unknown = np.flatnonzero(~np.isfinite(model).all(axis=1))
     model[unknown] = intersected(project, points[unknown])
     known = np.isfinite(model).all(axis=1)
-    same = replace(project, frame=frame) if frame != project.frame else project
-    if np.count_nonzero(known) < 3 or not is_free(project):
-        return same
-    scale, turn, shift, misfit = similarity(model[known], targets[known])
-    before = float(np.sqrt(np.mean((model[known] - targets[known]) ** 2)))
-    if not (np.isfinite(misfit) and SIMILAR * misfit < before):
-        return same
-    fields = {"n": int(np.count_nonzero(known)), "scale": scale, "misfit": misfit, "before": before}
-    message = Message.of("plain.carried", unit=block.linear_unit, **fields)
-    return carried(project, (scale, turn, shift), frame, message)
+    if np.count_nonzero(known) > 2 and is_free(project):
+        scale, turn, shift, misfit = similarity(model[known], targets[known])
+        before = float(np.sqrt(np.mean((model[known] - targets[known]) ** 2)))
+        if np.isfinite(misfit) and SIMILAR * misfit < before:
+            fields = {"n": int(np.count_nonzero(known)), "scale": scale, "misfit": misfit, "before": before}
+            message = Message.of("plain.carried", unit=project.block.linear_unit, **fields)
+            return carried(project, (scale, turn, shift), frame, message)
+    return replace(project, frame=frame) if frame != project.frame else project

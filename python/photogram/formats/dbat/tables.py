@@ -265,7 +265,7 @@ def read_export(path: Path, options: ReadOptions) -> DbatBuilder:
     take("nine standard deviations")
     default = take("the camera")
     take("standard deviations of the camera")
-    cameras = _Cameras(content, default, size)
+    common = default, _sensor(default, 0, "camera", size)
     for head in until_empty():
         number = _number(head, 0)
         if number in content.photo_rows:
@@ -275,7 +275,7 @@ def read_export(path: Path, options: ReadOptions) -> DbatBuilder:
             if _number(card, 0) != number:
                 raise card.place.error(phrase("dbat.photo", number=number, other=card.words[0]))
         file = (head.place.text or "").split(None, 1)[1] if len(head.words) > 1 else ""
-        content.numbered_photo(number, file, cameras.name_of(number, camera), head.place)
+        content.numbered_photo(number, file, _camera_of(camera, number, content, *common), head.place)
         angles = np.radians(pose.numbers(4, "kappa phi omega"))[np.newaxis, ::-1]
         content.pose(number, pose.numbers(1, "X Y Z"), Attitudes.of("omega_phi_kappa", angles).matrices[0])
     _control(until_empty(), content, options)
@@ -304,29 +304,21 @@ def _sensor(card: Card, first: int, name: str, size: Size) -> tuple[Camera, Size
         return sensor_of(name, size, sides, (c, px, py), named)
 
 
-class _Cameras:
-    """The camera of the header, and different cameras of photos."""
-
-    def __init__(self, content: DbatBuilder, head: Card, size: Size) -> None:
-        self.content, self.head, self.size = content, head, size
-        self.common = _sensor(head, 0, "camera", size)
-        self.others: dict[tuple[str, ...], str] = {}
-
-    def name_of(self, number: int, card: Card) -> str:
-        """Return the name of a photo's camera: usually the one of the header, rounded."""
-        given, own = self.head.numbers(0, _CAMERA), card.numbers(1, _CAMERA)
-        words = tuple(card.words[1:11])
-        last = [10.0 ** -len(word.partition(".")[2].lower().partition("e")[0]) for word in words]
-        if (np.abs(given - own) <= np.array(last)).all():
-            if "camera" not in self.content.camera_rows:
-                self.content.camera(*self.common, key="camera")
-            return "camera"
-        if words not in self.others:
-            name = self.others[words] = f"camera of photo {number}"
-            self.content.camera(*_sensor(card, 1, name, self.size), key=name)
-            remark = phrase("dbat.other-camera", photo=number, values=" ".join(words))
-            self.content.messages.append(Message(remark, card.place.file))
-        return self.others[words]
+def _camera_of(
+    card: Card, number: int, content: DbatBuilder, head: Card, common: tuple[Camera, Size, float]
+) -> Hashable:
+    """Add the camera of a photo, usually the one of the header, rounded; return its key."""
+    words, difference = tuple(card.words[1:11]), np.abs(head.numbers(0, _CAMERA) - card.numbers(1, _CAMERA))
+    last = [10.0 ** -len(word.partition(".")[2].lower().partition("e")[0]) for word in words]
+    if (difference <= np.array(last)).all():
+        if "camera" not in content.camera_rows:
+            content.camera(*common, key="camera")
+        return "camera"
+    if words not in content.camera_rows:
+        content.camera(*_sensor(card, 1, f"camera of photo {number}", common[1]), key=words)
+        remark = phrase("dbat.other-camera", photo=number, values=" ".join(words))
+        content.messages.append(Message(remark, card.place.file))
+    return words
 
 
 def _control(cards: Iterable[Card], content: DbatBuilder, options: ReadOptions) -> None:

@@ -60,14 +60,10 @@ def with_photo_positions(project: Project, options: ReadOptions) -> Project:
     if path is not None:
         metadata = read_gnss_file(path, project.block.photo_ids, directory, mrk_antenna=options.mrk_antenna)
         keys = _keys(project, metadata, weighted_only=True)
-        others = [
-            each
-            for each in project.block.observations
-            if not (isinstance(each, Position) and each.photo in keys)
-        ]
-        messages = list(project.messages)
-        if replaced := len(project.block.observations) - len(others):
-            messages.append(Message(phrase("photos.replaced", n=replaced), path))
+        given, messages = project.block.observations, list(project.messages)
+        others = [each for each in given if not (isinstance(each, Position) and each.photo in keys)]
+        if replaced := len(given) - len(others):
+            messages.append(Message.of("photos.replaced", path, n=replaced))
         if any(each.position and each.position.source == EVENTS for each in metadata.photos.values()):
             code = "photos.events" if antenna else "photos.events-without-lever"
             messages.append(Message.of(code, path))
@@ -109,12 +105,10 @@ def _with_positions(
     lacks = list(project.lacks)
     if lacking:
         lacks.append(Phrase("read.positions", {"n": lacking, "option": option_sd("gnss")}))
-    inputs = tuple(project.details.get("further inputs", ())) + metadata.tables
-    pictures = tuple(project.details.get("photo pictures", ())) + metadata.pictures
-    read = {"further inputs": inputs, "photo pictures": pictures}
-    project = project.replace(
-        messages=(*project.messages, *messages), lacks=tuple(lacks), details={**project.details, **read}
-    )
+    read = {"further inputs": metadata.tables, "photo pictures": metadata.pictures}
+    read = {name: (*project.details.get(name, ()), *paths) for name, paths in read.items()}
+    details = {**project.details, **read}
+    project = project.replace(messages=(*project.messages, *messages), lacks=tuple(lacks), details=details)
     if not photos:
         return project
     project, xyz, covariances = _in_frame(project, known, photos)
@@ -129,25 +123,17 @@ def _keys(project: Project, metadata: Metadata, *, weighted_only: bool = False) 
     """
     block = project.block
     observed = {each.photo for each in block.observations if isinstance(each, Position) and not weighted_only}
-    weighted = np.flatnonzero(np.isfinite(block.photo_position_sd).any(axis=1)).tolist()
-    observed |= {block.photo_ids[row] for row in weighted}
+    weighted = np.isfinite(block.photo_position_sd).any(axis=1)
     photos = Photos(metadata.photos)
-    found: dict[str, str] = {}
-    strange = []
-    for name in block.photo_ids:
-        keys = photos.meant(name)
-        if not keys:
-            strange.append(name)
-            continue
+    found = {name: photos.meant(name) for name in block.photo_ids}
+    for name, keys in found.items():
         if len(keys) > 1:
             raise InputError(phrase("photos.ambiguous", photo=name, names=keys), file=metadata.directory)
-        if name not in observed:
-            found[name] = keys[0]
-    if len(strange) == len(block.photo_ids):
-        raise InputError(
-            phrase("photos.none", names=strange, known=list(metadata.photos)), file=metadata.directory
-        )
-    return found
+    if not any(found.values()):
+        fields = {"names": list(found), "known": list(metadata.photos)}
+        raise InputError(phrase("photos.none", **fields), file=metadata.directory)
+    free = (name for name, known in zip(found, weighted, strict=True) if not known and name not in observed)
+    return {name: found[name][0] for name in free if found[name]}
 
 
 def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[Project, Floats, Floats]:
@@ -172,9 +158,8 @@ def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[
         if not is_free(project) or np.isfinite(project.block.point_sd).any():
             raise InputError(phrase("photos.place"), file=project.path)
         crs = known.systems[0]
-        frame = Frame(
-            "topocentric", ELLIPSOIDAL, amid(crs, known.xyz[[each == crs for each in known.systems]])
-        )
+        origin = amid(crs, known.xyz[[each == crs for each in known.systems]])
+        frame = Frame("topocentric", ELLIPSOIDAL, origin)
         xyz, covariances, remarks = known.in_frame(frame)
         project = _placed(project, photos, xyz, frame)
     project = project.replace(messages=(*project.messages, *map(Message, remarks)))
@@ -225,17 +210,12 @@ def _observations(
         while taken & {f"{kind.KIND} {name}" for kind in (LeverArm, Shift)}:
             name += "'"
         common[flight] = LeverArm(name, arm, arm_sd), Shift(name, 0.0, SHIFT_SD)
+    levers = [common[group][0] if group and arm_sd else arm for group in groups]
+    shifts = [common[flight][1] if flight else None for flight in known.flights]
+    rows = zip(photos, xyz, covariances, levers, shifts, strict=True)
     return [
-        Position(
-            photo,
-            position,
-            covariance=covariance,
-            lever_arm=common[group][0] if group and arm_sd else arm,
-            shift=common[group][1] if flight else None,
-        )
-        for photo, position, covariance, group, flight in zip(
-            photos, xyz, covariances, groups, known.flights, strict=True
-        )
+        Position(photo, position, covariance=covariance, lever_arm=lever, shift=shift)
+        for photo, position, covariance, lever, shift in rows
     ]
 
 
@@ -326,12 +306,9 @@ def located(
         _check_heights(known, said, systems, option)
     default = np.broadcast_to(np.nan if sd is None else np.asarray(sd, dtype=float), 3)
     deviations = [each.deviations.sd if each.deviations is not None else default for each in known]
-    return Located(
-        tuple(known),
-        tuple(systems),
-        np.array([each.position for each in said], dtype=float).reshape(-1, 3),
-        np.array(deviations, dtype=float).reshape(-1, 3),
-    )
+    positions = [each.position for each in said]
+    xyz, sds = (np.array(own, dtype=float).reshape(-1, 3) for own in (positions, deviations))
+    return Located(tuple(known), tuple(systems), xyz, sds)
 
 
 def _check_heights(

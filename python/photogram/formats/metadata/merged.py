@@ -58,18 +58,17 @@ class _Sources:
 
     def metadata(self) -> Metadata:
         """Return the record of each photo; the first source with a value has priority."""
-        photos, without_height = {}, []
+        photos, low = {}, []
         for key, sources in self.said.items():
             position = next((each for each in sources if each.is_located), None)
             if position is None and any(each.position is not None for each in sources):
-                without_height.append(key)
+                low.append(key)
             deviations = next((each for each in sources if each.sd is not None), None)
             photos[key] = PhotoRecord(key, self.flights[key], position, deviations)
-        remarks = list(self.messages)
-        if without_height:
-            remark = phrase("photos.heightless", n=len(without_height), names=without_height)
-            remarks.append(Message(remark, self.path))
-        return Metadata(self.path, photos, tuple(self.tables), tuple(self.pictures.values()), tuple(remarks))
+        if low:
+            self.messages.append(Message.of("photos.heightless", self.path, n=len(low), names=low))
+        pictures, remarks = tuple(self.pictures.values()), tuple(self.messages)
+        return Metadata(self.path, photos, tuple(self.tables), pictures, remarks)
 
 
 def _files_of(directory: Path) -> dict[str, Path]:
@@ -316,9 +315,8 @@ def read_metadata(directory: str | os.PathLike[str], *, mrk_antenna: bool = Fals
     exposures = _with_suffix(files, EXPOSURES)
     given = _tables(_with_suffix(files, *_TEXTS), found)
     if not (found.pictures or given or exposures):
-        raise InputError(
-            phrase("photos.sources", names=[*ENDINGS, "*_Timestamp.MRK", GEO_TXT]), file=directory
-        )
+        names = [*ENDINGS, "*_Timestamp.MRK", GEO_TXT]
+        raise InputError(phrase("photos.sources", names=names), file=directory)
     for key in dict.fromkeys([*found.pictures, *given]):
         found.said[key] = [given[key]] if key in given else []
         folder = PurePosixPath(key).parent.as_posix()
@@ -334,17 +332,15 @@ def remarks_on(records: Iterable[PhotoRecord]) -> list[Message]:
     fixes: dict[str, list[str]] = {}
     remarks: dict[str, int] = {}
     for each in records:
-        source = each.deviations or each.position
-        if source is not None and source.remark:
-            remarks[source.remark] = remarks.get(source.remark, 0) + 1
-        said = (own.fix for own in (each.deviations, each.position) if own is not None)
-        fix = next((own for own in said if own), FIXED)
+        sources = [source for source in (each.deviations, each.position) if source is not None]
+        for source in sources[:1]:
+            if source.remark:
+                remarks[source.remark] = remarks.get(source.remark, 0) + 1
+        fix = next((source.fix for source in sources if source.fix), FIXED)
         if fix != FIXED:
             fixes.setdefault(fix, []).append(each.photo)
-    found = [
-        Message(phrase("photos.fix", fix=fix, n=len(photos), names=photos)) for fix, photos in fixes.items()
-    ]
-    return found + [Message(phrase("photos.remark", remark=text, n=count)) for text, count in remarks.items()]
+    found = [Message.of("photos.fix", fix=fix, n=len(names), names=names) for fix, names in fixes.items()]
+    return found + [Message.of("photos.remark", remark=text, n=count) for text, count in remarks.items()]
 
 
 MAX_INTERVAL_DIFFERENCE = 2.0  # Seconds; EXIF has whole seconds
