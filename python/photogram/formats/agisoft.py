@@ -264,7 +264,7 @@ def write(project: Project) -> Mapping[str, bytes]:
     if not known_poses(block).any():
         raise InputError(phrase("format.poses"))
     frame, rotation, translation = project.frame, np.eye(3), np.zeros(3)
-    if frame.origin is not None:
+    if frame.origin is not None and frame.kind == "topocentric":
         from photogram.formats.crs import east_north_up, from_frame
 
         rotation = east_north_up(frame.origin).T
@@ -296,7 +296,7 @@ def write(project: Project) -> Mapping[str, bytes]:
 
 
 def _is_placed(frame: Frame) -> bool:
-    return frame.kind == "geocentric" or frame.origin is not None
+    return frame.kind == "geocentric" or (frame.kind == "topocentric" and frame.origin is not None)
 
 
 def _references(frame: Frame, xyz: Floats, covariances: Floats) -> tuple[Floats, Floats]:

@@ -86,7 +86,7 @@ class BlockBuilder:
         self.camera_rows: dict[Hashable, int] = {}
         self.photo_rows: dict[Hashable, int] = {}
         self.point_rows: dict[Hashable, int] = {}
-        self._photo_names, self._point_names = set[str](), set[str]()
+        self.photo_names, self.point_names = set[str](), set[str]()
         self.poses: dict[Hashable, tuple[Floats, Floats, str]] = {}
         self.remarks_on_systems = True  # Whether assumptions on heights of systems are reported
         self.crs: str | None = ""  # System of the coordinates of the frame; None: another
@@ -121,7 +121,7 @@ class BlockBuilder:
     ) -> None:
         """Add a photo of a camera."""
         place, name = place or self.place, str(key) if name is None else name
-        _check_name("photo", name, self._photo_names, place)
+        _check_name("photo", name, self.photo_names, place)
         if camera not in self.camera_rows:
             raise place.error(phrase("format.undefined", what="camera", name=str(camera)))
         _add(self.photo_rows, key, "photo", place)
@@ -192,7 +192,7 @@ class BlockBuilder:
     def point(self, key: Hashable, place: Failing | None = None, *, name: str | None = None) -> None:
         """Add a point."""
         place, name = place or self.place, str(key) if name is None else name
-        _check_name("point", name, self._point_names, place)
+        _check_name("point", name, self.point_names, place)
         _add(self.point_rows, key, "point", place)
         self.point_ids.append(name)
 

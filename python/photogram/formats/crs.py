@@ -131,6 +131,16 @@ def amid(crs: str, xyz: Floats) -> tuple[float, float, float]:
     return round(latitude, ORIGIN_DECIMALS), round(longitude, ORIGIN_DECIMALS), float(round(height))
 
 
+def utm_system(zone: int, *, south: bool) -> str:
+    """Return the system of a zone of UTM (WGS 84)."""
+    return f"EPSG:{(32700 if south else 32600) + zone}"
+
+
+def utm_zone(latitude: float, longitude: float) -> str:
+    """Return the system of the zone of UTM of a position in degrees."""
+    return utm_system(int((longitude + 180.0) // 6.0) % 60 + 1, south=latitude < 0)
+
+
 def in_degrees(xyz: Floats, geographic: bool = True) -> Floats:
     """Return (n, 3) positions with longitudes and latitudes in degrees if they are geographic."""
     return np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]]) if geographic else xyz

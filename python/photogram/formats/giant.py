@@ -8,11 +8,10 @@ from pathlib import Path
 from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError, message_of
 from photogram.formats.format import FORMATS
-from photogram.formats.project import Project
+from photogram.formats.project import Project, frame_of
 from photogram.formats.read_options import ReadOptions
 from photogram.giant.files import to_bytes
 from photogram.messages import Message
-from photogram.network.frame import Frame
 from photogram.words import Phrase, phrase
 
 
@@ -23,18 +22,15 @@ def read(path: Path, options: ReadOptions) -> Project:
 
     del options
     found = read_project(path)
-    block = found.to_block()
-    block = block.replace(refraction=job_refraction(found.common))
+    block = found.to_block().replace(refraction=job_refraction(found.common))
     messages = list(found.messages)
     if found.common.intersection_only:
-        messages.append(Message(phrase("format.intersection"), path))
+        messages.append(Message.of("format.intersection", path))
     return Project(
         block=block,
         path=path,
         title=FORMATS["giant"].title,
-        frame=Frame("geographic", ellipsoid=(block.spheroid.a, block.spheroid.b))
-        if block.spheroid
-        else Frame(),
+        frame=frame_of(block),
         options=AdjustOptions(unit_variance=found.common.unbiased_variance),
         messages=tuple(messages),
     )

@@ -94,12 +94,10 @@ def known_points(project: Project) -> KnownPoints:
 
 def check_images(block: Block, title: str) -> None:
     """Reject image coordinates of films or line scanners."""
-    scanned = [each.photo for each in block.passages if isinstance(each, Scan)]
-    if scanned:
-        raise InputError(phrase("format.film", title=title, photo=scanned[0]))
-    lines = [each.photo for each in block.timed if each.lines is not None]
-    if lines:
-        raise InputError(phrase("format.scanner", photo=lines[0]))
+    for scan in (each for each in block.passages if isinstance(each, Scan)):
+        raise InputError(phrase("format.film", title=title, photo=scan.photo))
+    for strip in (each for each in block.timed if each.lines is not None):
+        raise InputError(phrase("format.scanner", photo=strip.photo))
 
 
 def intersected(project: Project, points: Indices) -> Floats:
@@ -240,25 +238,16 @@ def in_pixels(project: Project) -> Project:
             reach = np.abs(xy[own]).max(axis=0, initial=1.0) * (2 if camera.image_y == "up" else 1)
             size = (ROUND * math.ceil(reach[0] / ROUND), ROUND * math.ceil(reach[1] / ROUND))
         sizes.append(size)
-    return project.replace(
-        block=block.replace(
-            cameras=made,
-            photo_cameras=which,
-            principal_distances=None,
-            image_xy=xy,
-            image_sd=sd,
-            timed=(),
-        ),
-        sizes=tuple(sizes),
-        pixel_mm=tuple(pixels),
-    )
+    images = {"image_xy": xy, "image_sd": sd, "timed": ()}
+    block = block.replace(cameras=made, photo_cameras=which, principal_distances=None, **images)
+    return project.replace(block=block, sizes=tuple(sizes), pixel_mm=tuple(pixels))
 
 
 def nominal_pixels(project: Project) -> list[Phrase]:
     """Return remarks on nominal sizes of pixels and images."""
     nominal = project.block.image_unit == "mm" and None in (project.pixel_mm or (None,))
-    found = [phrase("lost.nominal-pixels", size=NOMINAL_MM)] if nominal else []
-    return found + ([phrase("lost.image-size")] if _unsized(project) else [])
+    codes = {"lost.nominal-pixels": nominal, "lost.image-size": _unsized(project)}
+    return [phrase(code, size=NOMINAL_MM) for code, is_lost in codes.items() if is_lost]
 
 
 def _unsized(project: Project) -> bool:
@@ -334,12 +323,9 @@ def topocentric_remarks(project: Project) -> list[Phrase | str]:
     origin = _origin(block)
     up = local_frames(np.vstack([origin, block.photo_positions]))[:, 2]
     angle = math.degrees(float(np.arccos(np.clip(up[1:] @ up[0], -1, 1)).max())) * 60
-    longitude, latitude = np.degrees(origin[0, :2])
-    place = {"latitude": float(latitude), "longitude": float(longitude)}
-    ellipsoid = {"a": block.spheroid.a, "b": block.spheroid.b}
-    found: list[Phrase | str] = [
-        phrase("lost.geographic", unit=block.linear_unit, **place, **ellipsoid, angle=angle)
-    ]
+    place = zip(("longitude", "latitude"), np.degrees(origin[0, :2]).tolist(), strict=True)
+    fields = {"unit": block.linear_unit, "a": block.spheroid.a, "b": block.spheroid.b, **dict(place)}
+    found: list[Phrase | str] = [phrase("lost.geographic", **fields, angle=angle)]
     if n := len(block.observations):
         found.append(phrase("lost.observations", n=n, names=["images"]))
     return found

@@ -42,7 +42,6 @@ UNKNOWN_DOP = 15.0  # Metres: default of OpenSfM
 NO_HEIGHT = 1e4  # Metres: standard deviation of heights that are not observed
 _VERSIONS = {"OPENSFM_TRACKS_VERSION_v1": 9, "OPENSFM_TRACKS_VERSION_v2": 11}
 _FIRST = 8
-_NO_TRACKS = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty((0, 2))
 
 
 def read(path: Path, options: ReadOptions) -> Project:
@@ -72,17 +71,16 @@ def read(path: Path, options: ReadOptions) -> Project:
     points = dict(model.get("points", {}).items())
     starts = np.array([each["coordinates"].numbers(3) for each in points.values()]).reshape(-1, 3)
     block.points(list(points), starts)
-    if (folder / TRACKS).is_file():
-        photos, tracks, xy = _tracks(folder / TRACKS, list(shots), list(points), messages)
-    else:
-        photos, tracks, xy = _NO_TRACKS
+    file = folder / TRACKS
+    photos, tracks, xy = _tracks(file, list(shots), list(points), messages)
+    if not file.is_file():
         block.lacks.append(Phrase("read.tracks", {"file": TRACKS, "option": Phrase("option.images")}))
     sizes = np.array(block.sizes, dtype=float)[np.array(block.photo_cameras)[photos]]
     block.images(photos, tracks, sizes / 2 + sizes.max(axis=1, keepdims=True) * xy)
     block.observations += _gps(shots, options, messages)
-    for file in ("gcp_list.txt", "ground_control_points.json"):
-        if (folder / file).is_file():
-            messages.append(Message(phrase("opensfm.control", file=file, path=folder / file)))
+    for name in ("gcp_list.txt", "ground_control_points.json"):
+        if (folder / name).is_file():
+            messages.append(Message.of("opensfm.control", file=name, path=folder / name))
     colours = {
         name: [int(c) for c in each.get("color", [0, 0, 0]).numbers(3)] for name, each in points.items()
     }
@@ -168,8 +166,8 @@ def _frame(model: Tree) -> Frame:
 def _tracks(
     path: Path, names: list[str], points: list[str], messages: list[Message]
 ) -> tuple[Indices, Indices, Floats]:
-    """Return photo, point and (m, 2) normalised coordinates of observations."""
-    lines = read_lines(path)
+    """Return photo, point and (m, 2) normalised coordinates of observations; none without a file."""
+    lines = read_lines(path) if path.is_file() else []
     width = _VERSIONS.get(lines[0].strip(), 0) if lines else 0
     if lines and not width and lines[0].startswith("OPENSFM_TRACKS_VERSION"):
         one_word(Place(path, 1, lines[0]), "version", lines[0], _VERSIONS)

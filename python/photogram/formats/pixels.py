@@ -19,7 +19,7 @@ from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.photos import cameras_of
 from photogram.formats.plain.schema import column_units
 from photogram.formats.plain.settings import Settings
-from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.tables import Tables, check_rows, columns_of
 from photogram.formats.plain.writing import camera_table
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
@@ -72,16 +72,14 @@ def read(path: Path, options: ReadOptions) -> Project:
     which = np.array(cameras_of(table, [each.name for each in block.cameras]), dtype=np.int64)
     of_photo = np.zeros(len(photos.names), dtype=np.int64)
     of_photo[photos.rows] = which
-    other = np.flatnonzero(of_photo[photos.rows] != which)
-    if len(other):
-        raise table.error(int(other[0]), phrase("pixels.camera"))
+    check_rows(table, of_photo[photos.rows] != which, phrase("pixels.camera"))
     corner = corner_of(table, options.pixel_origin)
     if options.pixel_origin != "center" and (corner < 0).any() and (corner >= -0.5).all():
-        messages.append(Message(phrase("pixels.origin")))
+        messages.append(Message.of("pixels.origin"))
     xy = by_camera(corner, which, lambda row, own: from_corner(block.cameras[row], block.sizes[row], own))
     keep = table.flags("use")
     if not keep.all():
-        messages.append(Message(phrase("pixels.unused", n=int(np.count_nonzero(~keep))), path))
+        messages.append(Message.of("pixels.unused", path, n=int(np.count_nonzero(~keep))))
     sd = _sd(table, options)
     block.photos(photos.names, of_photo)
     block.points(points.names)
@@ -108,16 +106,15 @@ def write(project: Project) -> Mapping[str, bytes]:
     """Return the table of observations, and the table of cameras."""
     block = project.block
     cameras, which = known_cameras(block)
-    names = np.array([cameras[row].name for row in which], dtype=object)
-    photos, points = np.array(block.photo_ids, dtype=object), np.array(block.point_ids, dtype=object)
-    corner = to_corner(project)
+    owners = [cameras[row].name for row in which]
+    photos, points, names = (
+        np.array(own, dtype=object) for own in (block.photo_ids, block.point_ids, owners)
+    )
     columns = {
         "photo": photos[block.image_photos],
         "point": points[block.image_points],
-        "column": corner[:, 0],
-        "row": corner[:, 1],
-        "sd_column": block.image_sd[:, 0],
-        "sd_row": block.image_sd[:, 1],
+        **columns_of(("column", "row"), to_corner(project)),
+        **columns_of(("sd_column", "sd_row"), block.image_sd),
         "camera": names[block.image_photos],
     }
     return {

@@ -152,8 +152,7 @@ def table_files(result: Result) -> Mapping[str, bytes]:
         columns = {
             "photo": [block.photo_ids[row] for row in block.image_photos[known].tolist()],
             "point": [block.point_ids[row] for row in block.image_points[known].tolist()],
-            **dict(zip(("x", "y"), xy[known].T, strict=True)),
-            **dict(zip(("sd_x", "sd_y"), sd[known].T, strict=True)),
+            **dict(zip(("x", "y", "sd_x", "sd_y"), np.hstack([xy, sd])[known].T, strict=True)),
         }
         comments = [
             "mm in the frame of the marks, x right and y up on the positive; the lens is not taken out",

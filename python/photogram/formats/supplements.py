@@ -276,7 +276,11 @@ def with_control(
 
     listed = read_control_list(path, project)
     crs = crs or (listed.crs if listed else "")
-    own = {"tables": {"control": path}, "crs": {"control": crs} if crs else {}, "columns": {"control": columns}}
+    own = {
+        "tables": {"control": path},
+        "crs": {"control": crs} if crs else {},
+        "columns": {"control": columns},
+    }
     settings = Settings(path, frame=project.frame, length=project.block.linear_unit, sd=sd, **own)
     tables = Tables(settings, listed.messages if listed else [], frozenset(project.block.point_ids))
     table = listed.control if listed else tables.rows("control")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
+from photogram.formats.crs import GEOCENTRIC, amid, enu_origin, has_place, to_system, utm_zone, without_geoid
 from photogram.formats.declarations import declared
 from photogram.formats.project import frame_of
 from photogram.formats.results import Placed, placed
@@ -92,12 +92,8 @@ def chosen_crs(result: Result) -> str:
         return ""
     if frame.kind == "cartesian":
         return frame.crs
-    from photogram.formats.crs import to_system
-
-    earth, _ = to_system("EPSG:4978", result.photo_positions, frame)
-    latitude, longitude, _ = amid("EPSG:4978", earth)
-    zone = int((longitude + 180.0) // 6.0) % 60 + 1
-    return f"EPSG:{(32600 if latitude >= 0 else 32700) + zone}"
+    earth, _ = to_system(GEOCENTRIC, result.photo_positions, frame)
+    return utm_zone(*amid(GEOCENTRIC, earth)[:2])
 
 
 def map_layers(
