@@ -148,7 +148,6 @@ def _shots(chunk: Element, block: BlockBuilder) -> list[Element]:
 
 
 def _similarity(element: Element | None) -> _Similarity | None:
-    """Return the similarity of a transform; None without a rotation."""
     rotation = None if element is None else element.child("rotation")
     if element is None or rotation is None:
         return None

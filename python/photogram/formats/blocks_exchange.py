@@ -255,7 +255,6 @@ def _project(block: _Reader, srs: str) -> Project:
 
 
 def _corner(found: _Reader, images: list[tuple[int, int, float, float, bool]], groups: Any) -> Floats:
-    """Return (m, 2) columns and rows from the corner."""
     xy = np.array([each[2:4] for each in images], dtype=float).reshape(-1, 2)
     millimetres = np.array([each[4] for each in images], dtype=bool)
     corner = xy + CENTER

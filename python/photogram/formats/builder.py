@@ -242,7 +242,6 @@ class BlockBuilder:
         *,
         sd: ArrayLike = np.nan,
     ) -> None:
-        """Add an image observation of a photo that was added before."""
         if photo not in self.photo_rows:
             raise (place or self.place).error(phrase("format.undefined", what="photo", name=str(photo)))
         if point not in self.point_rows:
@@ -263,7 +262,6 @@ class BlockBuilder:
 
     @property
     def controls(self) -> int:
-        """Number of control points that were added one by one."""
         return len(self._control)
 
     def define_systems(self, system: Callable[[str], str]) -> None:
@@ -274,7 +272,6 @@ class BlockBuilder:
                 located[key] = each._replace(crs=system(each.crs))
 
     def frame_amid(self, crs: str) -> None:
-        """Set a topocentric frame amid the photos with positions in a system."""
         from photogram.formats.crs import amid
 
         centres = np.array([centre for centre, _, own in self.poses.values() if own == crs]).reshape(-1, 3)
@@ -340,7 +337,6 @@ class BlockBuilder:
         )
 
     def _photo_poses(self) -> tuple[Floats, Floats]:
-        """Return (P, 3) centres and (P, 3, 3) rotations in the frame."""
         if self._poses is not None:
             return self._poses
         count, systems = len(self.photo_ids), dict[str, list[int]]()
@@ -360,7 +356,6 @@ class BlockBuilder:
         return centres, matrices
 
     def _in_frame(self, crs: str, xyz: Floats, covariances: Floats) -> tuple[Floats, Floats]:
-        """Return positions and covariances of a system in the frame."""
         if crs == self.crs:
             return xyz, covariances
         if not crs or self.crs == "":
@@ -388,7 +383,6 @@ class BlockBuilder:
             yield from zip(own, own.values(), xyz, covariances, strict=True)
 
     def _point_fields(self) -> tuple[Floats, dict[str, Any]]:
-        """Return initial positions, and the fields of the block for points."""
         for key in (*self._control, *self._checks):
             if key not in self.point_rows:
                 self.point(key)

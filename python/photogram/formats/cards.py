@@ -17,8 +17,6 @@ END = "-99"  # Word that ends a photo or a file
 
 
 class Card:
-    """The words and the location of a line."""
-
     def __init__(self, place: Place) -> None:
         self.place = place
         self.words = (place.text or "").split()

@@ -58,7 +58,6 @@ def read_bundler(path: Path, options: ReadOptions) -> Project:
 
 
 def write_bundler(project: Project) -> Mapping[str, bytes]:
-    """Return `bundle.out` and `list.txt`."""
     from photogram.collection.formats import bundler
 
     found, names = collection_of(project)
@@ -75,7 +74,6 @@ def read_bal(path: Path, options: ReadOptions) -> Project:
 
 
 def write_bal(project: Project) -> Mapping[str, bytes]:
-    """Return the problem."""
     from photogram.collection.formats import bal
 
     return {PROBLEM: bal.to_bytes(collection_of(project)[0])}
@@ -103,7 +101,6 @@ def project_of(found: Collection, path: Path, title: str, names: Sequence[str | 
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
-    """Return the parameters of cameras that a collection cannot contain."""
     cameras = zip(project.block.cameras, project.sizes, strict=True)
     moved = any(_reduced(camera, size) is None for camera, size in cameras)
     return [phrase("lost.moved-images")] if moved else []
@@ -122,7 +119,6 @@ def _reduced(camera: Camera, size: Size | None) -> tuple[float, float, float] | 
 
 
 def collection_of(project: Project) -> tuple[Collection, list[str]]:
-    """Return the collection of a project, and the names of its photos."""
     from photogram.collection.collection import Collection
 
     block, positions, oriented = project.block, complete_positions(project), known_poses(project.block)

@@ -115,7 +115,6 @@ def column_of(heading: str) -> str | None:
 
 
 def is_photo(heading: str) -> bool:
-    """Return whether a heading is the column of photos."""
     return " ".join(words_of(heading)) in WORDS["photo"]
 
 

@@ -73,8 +73,6 @@ def degrees(text: str, other: str = "") -> float:
 
 @dataclass(frozen=True)
 class Columns:
-    """User-defined meaning of the columns of a table."""
-
     # Heading of each internal column; a leading `-` reverses the sign, a trailing `[ft]` is the unit
     headings: Mapping[str, str] = field(default_factory=dict)
     # Internal columns in the order of a table without header; `-` is not read
@@ -256,12 +254,10 @@ def _has_notes(column: str, own: str, word: str) -> bool:
 
 
 def is_geographic(table: ColumnTable) -> bool:
-    """Return whether the columns x and y of a table are longitudes and latitudes."""
     return all(axis in table and is_angular(heading_of(table, axis)) for axis in ("x", "y"))
 
 
 def heading_of(table: ColumnTable, column: str) -> str:
-    """Return the heading of an internal column in a table."""
     return dict(table.headings).get(column) or column
 
 
@@ -362,7 +358,6 @@ def check_unread(
 
 
 def _unread(table: ColumnTable, known: Collection[str]) -> list[tuple[str, str]]:
-    """Return unread columns, by internal name and heading."""
     return [
         (column, own or column)
         for column, own in table.headings

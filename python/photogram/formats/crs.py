@@ -269,7 +269,6 @@ def _on_earth(xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
 
 
 def is_projected(crs: str) -> bool:
-    """Return whether a system has eastings and northings of a projection."""
     return axes_of(crs)[0][0] == "easting"
 
 

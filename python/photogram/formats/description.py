@@ -222,7 +222,6 @@ class Agreement:
 
 
 def agreement(project: Project) -> Agreement:
-    """Return observations with the positions of a file."""
     block = project.block
     points, matrices = project.positions(), attitude_matrices(block)
     poses = np.column_stack([matrices.reshape(-1, 9), block.photo_positions])

@@ -37,7 +37,6 @@ def read(path: Path, options: ReadOptions) -> Project:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the five files."""
     from photogram.giant import Project as GiantProject
 
     records = GiantProject.from_block(project.block).records()
@@ -45,7 +44,6 @@ def write(project: Project) -> Mapping[str, bytes]:
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
-    """Return parts of a project that the cards cannot contain."""
     from photogram.giant import Project as GiantProject
 
     try:

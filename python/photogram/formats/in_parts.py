@@ -154,7 +154,6 @@ class Streamed:
         return self._spread_out[1]
 
     def close(self) -> None:
-        """Remove the buckets."""
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def source(self, options: CoreOptions) -> str:
@@ -294,7 +293,6 @@ class Streamed:
 
 
 def _selected(parts: Iterable[ColumnTable], wanted: Callable[[ColumnTable], Bools]) -> ColumnTable | None:
-    """Return the wanted rows of batches; None without batches."""
     found = [table.some(np.flatnonzero(wanted(table)).tolist()) for table in parts]
     return reduce(ColumnTable.joined, found) if found else None
 

@@ -53,7 +53,6 @@ class MicmacMarks:
 
 
 def has_marks(folder: Path) -> bool:
-    """Return whether a folder contains MicMac readings of marks."""
     return any(_scans(folder).glob(_IMAGES))
 
 

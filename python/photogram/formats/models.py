@@ -55,7 +55,6 @@ def attitude_matrices(block: Block) -> Floats:
 
 
 def correlated_control(block: Block) -> dict[str, Control]:
-    """Return control with correlated coordinates by point name."""
     return {each.point: each for each in block.observations.of_type(Control)}
 
 
@@ -244,7 +243,6 @@ def in_pixels(project: Project) -> Project:
 
 
 def nominal_pixels(project: Project) -> list[Phrase]:
-    """Return remarks on nominal sizes of pixels and images."""
     nominal = project.block.image_unit == "mm" and None in (project.pixel_mm or (None,))
     codes = {"lost.nominal-pixels": nominal, "lost.image-size": _unsized(project)}
     return [phrase(code, size=NOMINAL_MM) for code, is_lost in codes.items() if is_lost]

@@ -107,5 +107,4 @@ class NamedValues(UserDict[str, T]):
 
     @cached_property
     def data(self) -> dict[str, T]:  # type: ignore[override]
-        """The dictionary."""
         return dict(zip(self._names, np.asarray(self._values).tolist(), strict=True))

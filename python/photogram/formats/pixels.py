@@ -50,7 +50,6 @@ def corner_of(table: ColumnTable, pixel_origin: str | None) -> Floats:
 
 
 def has_pixels(path: Path) -> bool:
-    """Return whether the header of a table has the columns of photos, points and pixels."""
     spelling = partial(PLAIN.spelled, _KNOWN)
     try:
         return set(_NEEDED) <= set(spelling(read_head(path, _NEEDED, spelling)))
@@ -124,5 +123,4 @@ def write(project: Project) -> Mapping[str, bytes]:
 
 
 def cannot_hold(_: Project) -> list[Phrase]:
-    """Return that all but the observations and cameras is lost."""
     return [phrase("lost.all-but-images")]

@@ -183,7 +183,6 @@ def given_control(project: Project) -> dict[str, tuple[Floats, Bools]]:
 
 
 def lost_of_reduced(project: Project) -> list[Phrase]:
-    """Return images and principal distances that files of reduced coordinates cannot contain."""
     found = []
     if any(camera.unit == "px" for camera in known_cameras(project.block)[0]) and None in project.pixel_mm:
         found.append(phrase("lost.nominal-distance", distance=NOMINAL))
@@ -240,7 +239,6 @@ def _filled(path: Path) -> Sequence[Card]:
 
 
 def lost_in_patb(project: Project) -> list[Phrase]:
-    """Return parts of a project that the files of PATB cannot contain."""
     found = [*lost_of_reduced(project), phrase("lost.patb-digits")]
     if any((held[0] != held[1]) for _, held in given_control(project).values()):
         found.append(phrase("lost.horizontal-control"))
@@ -306,7 +304,6 @@ def read_bingo(path: Path, options: ReadOptions) -> Project:
 
 
 def lost_in_bingo(project: Project) -> list[Phrase]:
-    """Return parts of a project that the files of BINGO cannot contain."""
     found = lost_of_reduced(project)
     if any(name != word for name, word in _words(project).items()):
         found.append(phrase("lost.blanks"))
@@ -316,7 +313,6 @@ def lost_in_bingo(project: Project) -> list[Phrase]:
 
 
 def _words(project: Project) -> dict[str, str]:
-    """Return names as words of the files."""
     found: dict[str, str] = {}
     cameras = [each.name for each in known_cameras(project.block)[0]]
     for names in (project.block.photo_ids, project.block.point_ids, cameras):

@@ -47,7 +47,6 @@ def recognised(path: Path) -> Format:
 
 
 def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
-    """Return format and location of a project."""
     among = list(FORMATS.values()) if file_format is None else [_named(file_format)]
     with reading(path):
         path.stat()
@@ -140,7 +139,6 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
 
 
 def _fitting(project: Project, chosen: Format) -> Project:
-    """Return a project in the object and image coordinates of a format."""
     project = project if chosen.geographic else in_topocentric(project)
     return in_pixels(project) if chosen.pixels else project
 

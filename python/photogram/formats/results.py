@@ -107,7 +107,6 @@ def read_project(path: Path, options: ReadOptions) -> Project:
 
 
 def adjusted(project: Project, result: Result) -> Project:
-    """Return a project with adjusted parameters; observations are unchanged."""
     starts = np.where(np.isfinite(result.point_positions), result.point_positions, project.starts)
     return project.replace(block=result.restarted(), starts=starts, lacks=())
 
@@ -179,7 +178,6 @@ def table_files(result: Result) -> Mapping[str, bytes]:
 
 
 def feature_files(features: Features) -> Mapping[str, bytes]:
-    """Return the tables of features as CSV by file name."""
     tables = {
         "features.csv": frame(quantity_columns(features)),
         "feature_deviations.csv": frame(deviation_quantities(features)),
@@ -361,7 +359,6 @@ def placed(result: Result, crs: str = "") -> Placed:
 
 
 def placed_files(found: Placed) -> dict[str, bytes]:
-    """Return CSV tables of a result in a system."""
     ids = np.array(found.result.block.point_ids, dtype=object)
     degrees = tuple(Axis(name, "deg", suffix="_deg") for name in _ANGLES)
     angles = zip(("", "sd"), map(np.degrees, found.angles()), strict=True)
@@ -407,7 +404,6 @@ def _points(found: Placed) -> list[Quantity]:
 
 
 def _positions(found: Placed, xyz: Floats, covariances: Floats) -> list[Quantity]:
-    """Return positions with their standard deviations and covariances."""
     sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     decimals = decimals_of(sd)
     pairs = [(i, j) for i in range(3) for j in range(i + 1)]

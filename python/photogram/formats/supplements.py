@@ -132,7 +132,6 @@ def _repeated_rows(project: Project) -> tuple[Indices, Indices]:
 
 
 def _image_rows(block: Block) -> dict[tuple[str, str], int]:
-    """Return the row of each image observation by photo name and point name."""
     ids = zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
     return {(block.photo_ids[i], block.point_ids[j]): row for row, (i, j) in enumerate(ids)}
 
@@ -271,7 +270,6 @@ def with_control(
     crs: str | None,
     columns: Columns = PLAIN,
 ) -> Project:
-    """Return a project with control and check points of a table."""
     from photogram.formats.control import check_systems, read_control_list
 
     listed = read_control_list(path, project)

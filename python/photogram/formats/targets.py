@@ -237,7 +237,6 @@ def _with_places(board: Board, block: Block, number: Indices) -> Board:
 
 
 def adjusted_project(calibrated: Calibrated) -> Project:
-    """Convert an adjusted calibration to a project with adjusted values."""
     return project_of(calibrated.restarted_calibration())
 
 
@@ -282,7 +281,6 @@ def _sensors(project: Project) -> Floats:
 
 
 def lost_beside_cameras(project: Project) -> list[Phrase]:
-    """Return parts of a project that files of its cameras cannot contain."""
     block, known = project.block, [np.isfinite(sensor).all() for sensor in _sensors(project)]
     counts = (len(block.photo_ids), len(block.point_ids), len(block.image_xy))
     kinds = ("lost.all-photos", "lost.all-points", "lost.all-images")
@@ -293,7 +291,6 @@ def lost_beside_cameras(project: Project) -> list[Phrase]:
 
 
 def camera_file(name: str, project: Project) -> Mapping[str, bytes]:
-    """Return the file of cameras in a format of cameras."""
     from photogram.targets.camera_formats import CAMERA_FORMATS
 
     return CAMERA_FORMATS[name](rig_of_project(project))

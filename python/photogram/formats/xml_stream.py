@@ -36,8 +36,6 @@ _UNREADABLE = (*UNPACKABLE, ValueError, LookupError)
 
 @dataclass
 class Element:
-    """An element: its name, attributes, children and text."""
-
     name: str
     attributes: Mapping[str, str]
     file: Path
@@ -55,11 +53,9 @@ class Element:
         return self.place.error(message)
 
     def child(self, name: str) -> Element | None:
-        """Return the first child of a name."""
         return next((each for each in self.children if each.name == name), None)
 
     def all(self, name: str) -> Iterator[Element]:
-        """Yield the children of a name."""
         return (each for each in self.children if each.name == name)
 
     def need(self, name: str) -> Element:
@@ -70,7 +66,6 @@ class Element:
         return found
 
     def word(self, name: str, default: str = "") -> str:
-        """Return the text of a child."""
         found = self.child(name)
         return default if found is None else found.text.strip()
 

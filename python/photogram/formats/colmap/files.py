@@ -125,8 +125,6 @@ class Rig:
 
 @dataclass(frozen=True)
 class SensorImage(Sensor):
-    """An image of a sensor."""
-
     image: int = _form("Q", "DATA_ID")
 
 
@@ -191,7 +189,6 @@ _HEADS = {
 
 
 def _read(source: _Line | _Bytes, kind: type[_Kind]) -> _Kind:
-    """Return a record of declared fields."""
     values: dict[str, Any] = {"place": source.place} if hasattr(kind, "place") else {}
     for name, form in layout(kind).items():  # type: ignore[arg-type]
         if form.number is None:
@@ -258,8 +255,6 @@ class _Line:
 
 
 class _Bytes:
-    """The bytes of a file, record by record."""
-
     def __init__(self, path: Path, least: int) -> None:
         self.path, self.data, self.at, self.record = path, read_bytes(path), 0, 0
         self.records = self.count(least)
@@ -402,7 +397,6 @@ class _Places(Sequence[Place]):
 
 
 def _values(record: Any) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """Yield the values of a record with their forms."""
     for name, form in layout(type(record)).items():  # type: ignore[arg-type]
         value = getattr(record, name)
         if isinstance(form.kind, str):
@@ -413,8 +407,6 @@ def _values(record: Any) -> Iterator[tuple[str, tuple[Any, ...]]]:
 
 
 def binary_files(model: Model) -> dict[str, bytes]:
-    """Return the binary files of a model."""
-
     def packed(kind: str, values: tuple[Any, ...]) -> bytes:
         if kind == "features":
             return struct.pack("<Q", len(values[0])) + bytes(values[0])
@@ -466,7 +458,6 @@ def text_files(model: Model) -> dict[str, bytes]:
 
 
 def _records(model: Model) -> dict[str, Sequence[Any]]:
-    """Return the records of all files but points."""
     return {name: getattr(model, name) for name in ("cameras", "images", "rigs", "frames")}
 
 

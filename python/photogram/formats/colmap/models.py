@@ -37,7 +37,6 @@ MAX_DIFFERENCE, NORMALISED = 1e-2, 1e-6
 
 
 def read(path: Path, options: ReadOptions) -> Project:
-    """Read a model."""
     del options
     folder = colmap(path)
     if folder is None:
@@ -111,7 +110,6 @@ def _rigid(poses: Sequence[Sequence[float]], places: Sequence[Place]) -> tuple[F
 def _composed(
     model: files.Model, rotations: Floats, translations: Floats, messages: list[Message]
 ) -> list[FrameOf]:
-    """Compose poses of frames and rigs to poses of images."""
     if not model.frames:
         return []
     cameras = {camera.number: str(camera.number) for camera in model.cameras}
@@ -223,8 +221,6 @@ def write(kind: str, project: Project) -> Mapping[str, bytes]:
 
 @dataclass(frozen=True)
 class _Written:
-    """A model with the numbers of photos, points and cameras."""
-
     model: files.Model
     photos: dict[str, int]
     points: dict[str, int]

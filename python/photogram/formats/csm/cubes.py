@@ -55,13 +55,11 @@ _CHANGED = ("AlphaCube", "Mapping")
 
 
 def is_cube(path: Path) -> bool:
-    """Return whether a file is an ISIS cube."""
     with reading(path), path.open("rb") as file:
         return file.read(len(_MARK)).lower() == _MARK.lower()
 
 
 def read_label(path: Path) -> Group:
-    """Return the label of a cube."""
     text = b""
     with reading(path), path.open("rb") as file:
         while (end := _END.search(text)) is None:
@@ -188,7 +186,6 @@ def _named(instrument: Tree) -> tuple[str, str]:
 
 
 def serial_number(label: Group, path: Path) -> str:
-    """Return the serial number of a cube in control networks."""
     instrument = _members(label.need("IsisCube", path).need("Instrument", path), path)
     spacecraft, name = _named(instrument)
     if spacecraft == _LRO and name in _NAC:
@@ -321,7 +318,6 @@ def read_list(path: Path) -> dict[str, Path]:
 
 
 def _of_line(text: str, folder: Path) -> tuple[str, Path]:
-    """Return serial number and file of a line."""
     serial, comma, rest = text.partition(",")
     alone = folder / text
     if comma and not alone.is_file():

@@ -49,7 +49,6 @@ APART = 0.01  # Largest difference of the time tables, relative to the span
 
 
 def isd_of(tree: Tree) -> Isd:
-    """Return the support data in a document."""
     keywords = tree.get("naif_keywords", {})
     kind = cast("Any", _KINDS[tree["name_model"].known("sensor model", _KINDS)])
     size = tree["image_samples"].whole(1), tree["image_lines"].whole(1)
@@ -159,7 +158,6 @@ def _turns(tree: Tree, name: str) -> Turns:
 
 
 def constant_rotation(table: Tree, key: str) -> Floats:
-    """Return the constant rotation after the rotations of the records."""
     if key not in table:
         return np.eye(3)
     with at_place(table[key]):
@@ -167,7 +165,6 @@ def constant_rotation(table: Tree, key: str) -> Floats:
 
 
 def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
-    """Return the framelets of a push frame camera, each exposed around its own time."""
     own = tree["framelet_height"]
     height = own.number() / summing
     every = tree["interframe_delay"].number()
@@ -180,7 +177,6 @@ def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
 
 
 def _lens(tree: Tree, focal_length: float) -> Lens | None:
-    """Return the lens; None without distortion."""
     optics = tree["optical_distortion"]
     models = [name for name, _ in optics.items()]
     if len(models) != 1:
@@ -248,7 +244,6 @@ def transformed(keywords: Tree, code: str) -> Plane:
 
 
 def not_zero(tree: Tree) -> float:
-    """Return a number that is not zero."""
     found = tree.number()
     if not found:
         raise tree.error(phrase("format.zero"))
@@ -302,8 +297,6 @@ _FRAME = "USGS_ASTRO_FRAME_SENSOR_MODEL"
 
 
 def _middle(axis: str) -> Callable[[Tree], float | None]:
-    """Return a function that derives the centre of a whole frame."""
-
     def derive(tree: Tree) -> float | None:
         if not tree["name_model"].text().startswith(_FRAME) or tree[f"starting_detector_{axis}"].number():
             return None
@@ -313,7 +306,6 @@ def _middle(axis: str) -> Callable[[Tree], float | None]:
 
 
 def _only_time(tree: Tree) -> Any:
-    """Return the time of the only pointing record."""
     times = tree["instrument_pointing"].get("ephemeris_times", []).value
     return times[0] if isinstance(times, list) and len(times) == 1 else None
 

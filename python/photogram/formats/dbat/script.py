@@ -51,7 +51,6 @@ _GROUPS = {
 
 
 def read_script(path: Path, options: ReadOptions) -> DbatBuilder:
-    """Read a script and its tables."""
     root = read_stream(path, {}, "document")
     given = root.need("input")
     content = DbatBuilder(path, TITLE)
@@ -118,7 +117,6 @@ def _tables(parent: Element, base: Path) -> Iterator[tuple[Element, ColumnTable]
 
 
 def _filter(points: Element) -> Callable[[int], bool]:
-    """Return a function that selects the points of a filter."""
     found = points.child("filter")
     if found is None:
         return lambda _: True
@@ -241,7 +239,6 @@ _FREE = 10  # Number of lines that are searched for a header
 
 
 def is_measurements(path: Path) -> bool:
-    """Return whether a file is a table of observations of PhotoModeler."""
     try:
         begin = read_beginning(path).lower()
     except InputError:

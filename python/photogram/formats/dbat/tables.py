@@ -73,7 +73,6 @@ class DbatBuilder(BlockBuilder):
         self.options = AdjustOptions()
 
     def numbered_photo(self, number: int, path: str, camera: Hashable, place: Failing) -> None:
-        """Add a photo with its file."""
         self.photo(number, camera, place)
         self.paths.append(path)
 
@@ -156,7 +155,6 @@ def take_photos(table: ColumnTable, content: DbatBuilder) -> None:
 
 
 def take_poses(table: ColumnTable, content: DbatBuilder, unit: str = "degrees") -> None:
-    """Add centres and angles omega, phi, kappa."""
     one_word(table.head, "unit of angles", unit, _RADIANS)
     table.require("id", "x", "y", "z", "omega", "phi", "kappa")
     angles = table.given(("omega", "phi", "kappa")) * _RADIANS[unit]

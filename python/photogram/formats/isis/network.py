@@ -263,12 +263,10 @@ def _kind(data: bytes) -> str:
 
 
 def is_network(head: bytes) -> bool:
-    """Return whether this is the start of a control network."""
     return _kind(head) in (_BINARY, _TEXT)
 
 
 def is_binary(path: Path) -> bool:
-    """Return whether a control network is binary."""
     with reading(path), path.open("rb") as file:
         return _kind(file.read(LABEL_BYTES)) == _BINARY
 

@@ -36,8 +36,6 @@ from photogram.words import phrase
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """A network after adjustment of its block."""
-
     contents: PlanetaryContents
     result: Result
 
@@ -183,7 +181,6 @@ class PlanetaryContents:
 
 
 def contents_of(details: Mapping[str, Any]) -> PlanetaryContents:
-    """Return the contents of a project from a control network."""
     found = details.get(DETAILS)
     if not isinstance(found, PlanetaryContents):
         raise InputError(phrase("isis.project"))
@@ -240,7 +237,6 @@ def rejecting(project: Project, adjust: Callable[..., Result]) -> Callable[..., 
 
 
 def rejection_limit(lengths: Floats, multiplier: float) -> float:
-    """Return median + multiplier x 1.4826 x median absolute deviation."""
     median = float(np.nanmedian(lengths))
     return median + multiplier * NORMAL * float(np.nanmedian(np.abs(lengths - median)))
 
@@ -280,7 +276,6 @@ _Columns = Sequence[tuple[tuple[str, ...], Any]]  # Columns with the lines of th
 
 
 def jigsaw_files(outcome: Outcome) -> Mapping[str, bytes]:
-    """Return the files by their names."""
     images = {
         image: parameters(image, outcome.result.trajectories[image.solving.trajectory.name])
         for image in outcome.contents.different
@@ -320,7 +315,6 @@ def _rms(outcome: Outcome, image: Image) -> list[float]:
 
 
 def _triple(what: str, names: Sequence[str], units: str, values: Floats) -> list[tuple[Any, Floats]]:
-    """Return three columns of (n, 3) values."""
     heads = zip(names, units.split(), strict=True)
     return [((what, name, f"({unit})"), column) for (name, unit), column in zip(heads, values.T, strict=True)]
 
@@ -379,7 +373,6 @@ def _residuals(outcome: Outcome) -> _Columns:
 
 
 def _report(outcome: Outcome, images: Mapping[Image, list[_Coefficient]], points: _Columns) -> Iterator[str]:
-    """Yield the lines of `bundleout.txt`."""
     network, settings = outcome.contents.network, outcome.contents.settings
     facts: dict[str, dict[str, object]] = {
         "JIGSAW: BUNDLE ADJUSTMENT": {

@@ -135,7 +135,6 @@ COMPARED = 16  # Number of times for the comparison
 
 
 def observation_number(serial: str) -> str:
-    """Return the observation of an image from its serial number."""
     count = next((count for begin, count in _KEYWORDS.items() if re.match(begin, serial)), 0)
     if count == 0:
         raise InputError(phrase("isis.observation-rule", image=serial))

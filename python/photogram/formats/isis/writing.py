@@ -45,7 +45,6 @@ _UPPER = np.triu_indices(3)
 
 
 def _header(network: ControlNetwork) -> list[tuple[str, Value]]:
-    """Return the header of a network in the order of ISIS."""
     return [(key, text) for key, name in HEADER.items() if (text := getattr(network, name)) is not None]
 
 

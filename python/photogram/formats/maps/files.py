@@ -157,7 +157,6 @@ def _symbol(row: DrawnLayer) -> tuple[str, str, Mapping[str, str]]:
 
 
 def style(name: str) -> str:
-    """Return the style of a layer."""
     rows = LAYERS[name]
     attribute = "kind" if rows[0].value else ""
     root = Element("qgis", version="3.22.0", styleCategories="Symbology")

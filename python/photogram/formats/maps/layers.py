@@ -349,8 +349,6 @@ SHARE = 0.3  # Size of a typical drawn ellipse relative to the distance between 
 
 @dataclass(frozen=True, eq=False)
 class Ellipses:
-    """n error ellipses."""
-
     major: Floats  # (n,) semi-axes in the unit of the positions
     minor: Floats
     azimuth: Floats  # (n,) of the major axis, clockwise from the second axis (north): radians, -pi/2 to pi/2

@@ -85,7 +85,6 @@ def _with_positions(
     option: str,
     antenna: tuple[float, float, float, float] | None = None,
 ) -> Project:
-    """Return a project with positions of the photos in `keys` as observations."""
     records = {name: metadata.photos[key] for name, key in keys.items()}
     there = [name for name, each in records.items() if each.position is not None]
     photos = [name for name in there if records[name].deviations is not None or "gnss" in sd]

@@ -86,8 +86,6 @@ def _with_suffix(files: Mapping[str, Path], *suffixes: str) -> dict[str, Path]:
 
 
 class Photos:
-    """Lookup of photos of a folder by relative path or name."""
-
     def __init__(self, keys: Iterable[str]) -> None:
         self._known: tuple[dict[str, list[str]], ...] = ({}, {}, {})
         for key in keys:
@@ -170,7 +168,6 @@ def _add_exposures(files: Mapping[str, Path], found: _Sources, *, antenna: bool)
 
 
 def _unused(path: Path, total: int, used: int) -> list[Message]:
-    """Return a message on exposures of a file without a photo."""
     return [Message(phrase("photos.unused", n=total - used, total=total), path)] if used < total else []
 
 
