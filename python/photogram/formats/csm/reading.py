@@ -14,7 +14,6 @@ from photogram.formats.csm.isd import (
     Framelets,
     Isd,
     Jitter,
-    Pixels,
     Plane,
     Positions,
     Turns,
@@ -198,19 +197,12 @@ def _detector(tree: Tree, keywords: Tree, code: str | None) -> Detector:
     def pair(form: str) -> Floats:
         return np.array([tree[form.format(axis)].number() for axis in ("sample", "line")])
 
-    centre = tree["detector_center"]
     summing = pair("detector_{}_summing")
     positive(tree["detector_sample_summing"], "the sum of pixels", float(summing.min()))
     csm = from_pixels(tree["focal2pixel_samples"], tree["focal2pixel_lines"])
-    planes: dict[Pixels, Plane] = {"csm": csm, "isis": csm}
-    if code is not None:
-        planes["isis"] = transformed(keywords, code)
-    return Detector(
-        np.array([centre["sample"].number(), centre["line"].number()]),
-        pair("starting_detector_{}"),
-        summing,
-        planes,
-    )
+    isis = csm if code is None else transformed(keywords, code)
+    centre = np.array([tree["detector_center"][axis].number() for axis in ("sample", "line")])
+    return Detector(centre, pair("starting_detector_{}"), summing, {"csm": csm, "isis": isis})
 
 
 def from_pixels(samples: Tree, lines: Tree) -> Plane:

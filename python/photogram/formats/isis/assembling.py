@@ -104,14 +104,11 @@ def read(path: Path, options: ReadOptions) -> Project:
     remarks = [Message(remark, each.path) for each in images for remark in each.supported.isd.remarks]
     measures, points = network.measures, network.points
     again = (measures.rejected | points.rejected[network.point_of_measure]) & ~measures.ignore
-    counts = {
-        "isis.ignored-points": points.ignore.sum(),
-        "isis.ignored-measures": network.is_ignored.sum(),
-        "isis.rejected-measures": again.sum(),
-    }
-    left = [Message.of(code, n=int(n)) for code, n in counts.items() if n]
+    omitted = points.ignore.sum(), network.is_ignored.sum(), again.sum()
+    codes = ("isis.ignored-points", "isis.ignored-measures", "isis.rejected-measures")
+    left = [Message.of(code, n=int(n)) for code, n in zip(codes, omitted, strict=True) if n]
     if unused:
-        left.append(Message(phrase("isis.unused", n=len(unused), names=unused), options.cubes))
+        left.append(Message.of("isis.unused", options.cubes, n=len(unused), names=unused))
     return _project(contents, seen, [*left, *remarks])
 
 
@@ -211,14 +208,10 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
         a, b = contents.different[0].supported.isd.radii
         spheroid = Spheroid((2 * a + b) / 3, (2 * a + b) / 3)
     timed = [each for own in contents.different for each in own.supported.timed]
+    flown = [own.supported.flown for own in contents.different for _ in own.supported.timed]
     # Approximate poses: of frames, and of the first lines of scanners.
-    found = [
-        about(
-            own.supported.flown, float(each.time or 0.0 if each.lines is None else each.lines.times([0.0])[0])
-        )
-        for own in contents.different
-        for each in own.supported.timed
-    ]
+    times = [each.time or 0.0 if each.lines is None else each.lines.times([0.0])[0] for each in timed]
+    found = [about(own, float(time)) for own, time in zip(flown, times, strict=True)]
     axes = Cartesian(spheroid)
     centres = axes.from_cartesian(np.array([centre for centre, _ in found]))
     matrices = axes.to_local(np.array([matrix for _, matrix in found]), centres)
@@ -240,6 +233,5 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
     fields = {"number": PITCHES, "unit": "px", "option": option_sd("images")}
     block.lacks.append(Phrase("read.images", fields))
     details = {DETAILS: contents, "further inputs": [each.path for each in contents.different]}
-    return block.project(
-        details=details, title=contents.network.network_id or "", timed=timed, spheroid=spheroid
-    )
+    title = contents.network.network_id or ""
+    return block.project(details=details, title=title, timed=timed, spheroid=spheroid)
