@@ -19,6 +19,7 @@ from photogram.formats.format import FORMATS
 from photogram.formats.project import Project, frame_of
 from photogram.formats.read_options import ReadOptions
 from photogram.io.csv_text import csv_text
+from photogram.io.places import Place, one_word
 from photogram.io.sheets import workbook
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.attitudes import Attitudes, angles_form
@@ -69,12 +70,7 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
     }
     folder = path_of("directory", directory)
     document = read_summary(folder)
-    kind = document["kind"]
-    if kind not in readers:
-        raise InputError(
-            phrase("format.unknown", what="kind of the result", value=str(kind), names=list(readers)),
-            file=folder / SUMMARY,
-        )
+    kind = one_word(Place(folder / SUMMARY), "kind of the result", str(document["kind"]), readers)
     try:
         return readers[kind](folder, document)
     except InputError:
@@ -85,7 +81,6 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
 
 def read_project(path: Path, options: ReadOptions) -> Project:
     """Read the adjusted block of a result, with its adjustment settings."""
-    del options
     result = read_result(path)
     if not isinstance(result, Result):
         raise InputError(phrase("results.collection"), file=path)
@@ -143,7 +138,8 @@ def _filled_tables(result: Result) -> Iterator[tuple[str, dict[str, Any], list[s
 
 def table_files(result: Result) -> Mapping[str, bytes]:
     """Return the tables of a result as CSV by file name, without empty tables."""
-    files = {f"{name}.csv": csv_text(*table) for name, *table in _filled_tables(result)}
+    tables = _filled_tables(result)
+    files = {f"{name}.csv": csv_text(columns, comments) for name, columns, comments in tables}
     if result.films:
         # Film observations in the camera frame, for programs without film models.
         (xy, sd), block = result.refined, result.block
@@ -178,10 +174,8 @@ def table_files(result: Result) -> Mapping[str, bytes]:
 
 
 def feature_files(features: Features) -> Mapping[str, bytes]:
-    tables = {
-        "features.csv": frame(quantity_columns(features)),
-        "feature_deviations.csv": frame(deviation_quantities(features)),
-    }
+    quantities = {"features.csv": quantity_columns, "feature_deviations.csv": deviation_quantities}
+    tables = {name: frame(columns(features)) for name, columns in quantities.items()}
     return {name: csv_text(columns) for name, columns in tables.items() if columns["feature"]}
 
 
@@ -335,10 +329,7 @@ def placed(result: Result, crs: str = "") -> Placed:
         names, units = axes_of(crs)
     elif block.geographic:
         names, units = ("longitude", "latitude", "height"), ("deg", "deg", block.linear_unit)
-    turned = [
-        turned_covariances(turns, own)
-        for turns, own in zip((photo_turns, point_turns), covariances, strict=True)
-    ]
+    turned = list(map(turned_covariances, (photo_turns, point_turns), covariances))
     attitude_covariances = result.photo_covariances[:, 3:, 3:]
     known = attitude_covariances if np.isfinite(attitude_covariances).all() else None
     own = Attitudes.of(angles_form(block.photo_to_ground), result.photo_attitudes, known)
@@ -370,10 +361,8 @@ def placed_files(found: Placed) -> dict[str, bytes]:
         ],
         "points.csv": _points(found),
     }
-    for name, (rows, vectors) in (
-        ("control.csv", found.control_differences()),
-        ("check_points.csv", found.differences()),
-    ):
+    differences = {"control.csv": found.control_differences(), "check_points.csv": found.differences()}
+    for name, (rows, vectors) in differences.items():
         if len(rows):
             tables[name] = [column("point", ids[rows]), Quantity(vectors, _METRES, "deviation", "d")]
     comments = [
@@ -443,8 +432,7 @@ def placed_section(found: Placed) -> Section:
     decimals = named(columns, "sd").decimals
     steps = np.array([differences[row] for row in rows.tolist()])
     columns.append(Quantity(steps, _METRES, "deviation", head="d {}", decimals=decimals))
-    note = "d: adjusted minus given. Tables of all photos and points are in `in_crs`" + (
-        f"; {len(own) - MOST} more there." if len(own) > MOST else "."
-    )
+    more = f"; {len(own) - MOST} more there." if len(own) > MOST else "."
+    note = f"d: adjusted minus given. Tables of all photos and points are in `in_crs`{more}"
     title = f"Control and check points in {found.crs}"
     return Section("in-crs", title, [Table("", title, columns, note)] if own else [])

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
+from photogram.formats.crs import amid, from_frame, has_geoid_heights, has_place, is_on, to_frame
 from photogram.formats.metadata.merged import (
     WITHOUT,
     Metadata,
@@ -116,13 +117,10 @@ def _with_positions(
 
 
 def _keys(project: Project, metadata: Metadata, *, weighted_only: bool = False) -> dict[str, str]:
-    """Return the name in the metadata of each photo without observed position.
-
-    If `weighted_only`, only weighted photo positions count as observed.
-    """
+    """Return the names in the metadata of photos without observed, or only without weighted, position."""
     block = project.block
     observed = {each.photo for each in block.observations if isinstance(each, Position) and not weighted_only}
-    weighted = np.isfinite(block.photo_position_sd).any(axis=1)
+    weighted: Bools = np.asarray(np.isfinite(block.photo_position_sd).any(axis=1))
     photos = Photos(metadata.photos)
     found = {name: photos.meant(name) for name in block.photo_ids}
     for name, keys in found.items():
@@ -137,8 +135,6 @@ def _keys(project: Project, metadata: Metadata, *, weighted_only: bool = False) 
 
 def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[Project, Floats, Floats]:
     """Return a georeferenced project, and positions and covariances in its frame."""
-    from photogram.formats.crs import amid, from_frame, has_place
-
     frame = project.frame
     if project.block.linear_unit != "m":
         raise InputError(phrase("photos.metres", unit=project.block.linear_unit), file=project.path)
@@ -251,8 +247,6 @@ class Located:
 
     def in_frame(self, frame: Frame) -> tuple[Floats, Floats, list[Phrase]]:
         """Return (n, 3) positions and (n, 3, 3) covariances in a frame, and remarks."""
-        from photogram.formats.crs import to_frame
-
         turned = covariances_of(self.sd)
         xyz, remarks = np.empty_like(self.xyz), list[Phrase]()
         for crs in dict.fromkeys(self.systems):
@@ -293,8 +287,6 @@ def located(
     if option == GNSS_CRS and crs is None and not any(each.crs for each in said):
         systems = [""] * len(said)
     else:
-        from photogram.formats.crs import is_on
-
         named = [each for each in said if each.crs and each.heights]
         if crs is not None and named and not is_on(crs, _WGS84):
             raise named[0].place.error(phrase("photos.wgs84", crs=crs, option=option))
@@ -314,8 +306,6 @@ def _check_heights(
     records: Sequence[PhotoRecord], said: Sequence[Said], systems: Sequence[str], option: str
 ) -> None:
     """Reject heights of different or unknown reference surfaces."""
-    from photogram.formats.crs import has_geoid_heights
-
     surfaces = {
         system: ABOVE[system != ELLIPSOIDAL and has_geoid_heights(system)] if system else _UNKNOWN
         for system in dict.fromkeys(systems)

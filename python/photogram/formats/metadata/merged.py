@@ -103,11 +103,8 @@ class Photos:
             stems.get(path.stem.casefold()),
             stems.get(path.name.casefold()),  # A name without suffix that contains a dot
         )
-        for keys in tried:
-            inside = [each for each in keys or () if PurePosixPath(each).is_relative_to(folder)]
-            if inside:
-                return inside
-        return []
+        inside = ([key for key in keys or () if PurePosixPath(key).is_relative_to(folder)] for keys in tried)
+        return next(filter(None, inside), [])
 
 
 def _tables(files: Mapping[str, Path], found: _Sources) -> dict[str, Said]:
@@ -250,15 +247,12 @@ class Metadata(Documented):
             column("photos", [len(own) for own in flights.values()], "Photos"),
             column("rtk", [sum(each.rtk for each in own) for own in flights.values()], "Of RTK"),
         ]
-        return Document(
-            "Positions of photographs",
-            "",
-            sections=[
-                Section("read", "Read", [Facts("", files)]),
-                Section.of(Table("flights", "Flights", columns)),
-                remarks_section([*self.messages, *remarks_on(located)]),
-            ],
-        )
+        sections = [
+            Section("read", "Read", [Facts("", files)]),
+            Section.of(Table("flights", "Flights", columns)),
+            remarks_section([*self.messages, *remarks_on(located)]),
+        ]
+        return Document("Positions of photographs", "", sections=sections)
 
 
 def counts(sources: Iterable[Said | None]) -> dict[str, int]:

@@ -171,9 +171,8 @@ def _properties(data: bytes, path: Path) -> dict[tuple[str, str], str]:
     if len(data) > LARGEST:
         raise place.error(phrase("photos.packet", n=len(data), most=LARGEST))
     try:
-        root = ElementTree.fromstring(
-            data.strip(b"\0 \t\r\n"), ElementTree.XMLParser(target=_WithoutDoctype())
-        )
+        parser = ElementTree.XMLParser(target=_WithoutDoctype())
+        root = ElementTree.fromstring(data.strip(b"\0 \t\r\n"), parser)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise place.error(phrase("photos.xmp", reason=str(error))) from None
     found: dict[tuple[str, str], str] = {}
@@ -202,9 +201,8 @@ def said_by_packet(data: bytes, path: Path) -> Said | None:
         text = properties.get((space, name))
         return math.nan if text is None else Place(path, text=f"{name} {text}").number(text, name)
 
-    position, deviations, accuracies, (yaw, pitch, roll) = (
-        [number(space, name) for name in names] for space, names in _PROPERTIES
-    )
+    values = [[number(space, name) for name in names] for space, names in _PROPERTIES]
+    position, deviations, accuracies, (yaw, pitch, roll) = values
     text = properties.get((DJI, "RtkFlag"))
     flag = None if text is None else place.whole(text, "RtkFlag", highest=1000)
     sd = None if flag == 0 else usable_deviations(*deviations)

@@ -165,9 +165,8 @@ def _exposure(place: Place, antenna: bool) -> Said:
     north, east, up = (place.number(each, "standard deviation") for each in accuracies[-1])
     flag = place.whole(named["Q"], "Q", highest=LARGEST_FLAG)
     to_north, to_east, down = (place.number(named[each], each) / 1000 for each in "NEV")
-    position = geographic_position(
-        place, [place.number(named[each], each) for each in ("Lon", "Lat", "Ellh")]
-    )
+    place_of_camera = [place.number(named[each], each) for each in ("Lon", "Lat", "Ellh")]
+    position = geographic_position(place, place_of_camera)
     place.number(seconds, "seconds")
     place.whole(week[1:-1].strip(), "week", highest=10**5)
     if antenna and position is not None:
@@ -394,11 +393,8 @@ def read_geo_txt(path: Path) -> dict[str, Said]:
             raise place.error(phrase("format.words", n=count, required=required))
         values = [place.number(word) for word in words[:8]] + [math.nan] * (8 - len(words))
         x, y, z, yaw, pitch, roll, horizontal, vertical = values
-        geographic, sd = (
-            crs in (ELLIPSOIDAL, UNSAID_SYSTEM),
-            usable_deviations(horizontal, horizontal, vertical),
-        )
-        position = geographic_position(place, (x, y, z)) if geographic else (x, y, z)
+        sd, position = usable_deviations(horizontal, horizontal, vertical), (x, y, z)
+        known = geographic_position(place, position) if crs in (ELLIPSOIDAL, UNSAID_SYSTEM) else position
         angles = None if count < 7 else (yaw, pitch, roll)
-        found[name] = Said(GEO_TXT, place, crs, position=position, sd=sd, angles=angles)
+        found[name] = Said(GEO_TXT, place, crs, position=known, sd=sd, angles=angles)
     return found
