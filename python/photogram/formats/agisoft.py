@@ -12,16 +12,10 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.crs import GEOCENTRIC as EARTH
-from photogram.formats.crs import GEOGRAPHIC
+from photogram.formats.crs import GEOGRAPHIC, east_north_up, from_frame
 from photogram.formats.format import FORMATS
 from photogram.formats.images import Y_DOWN, checked_rotation, known_size, lens_with, pixel_rows
-from photogram.formats.models import (
-    KnownPoints,
-    attitude_matrices,
-    chosen_model,
-    known_cameras,
-    known_points,
-)
+from photogram.formats.models import KnownPoints, attitude_matrices, chosen_model, known_cameras, known_points
 from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream
@@ -116,10 +110,8 @@ def _sensor(element: Element, name: str, messages: list[Message]) -> tuple[Camer
         else:
             fx, fy = calibration.number("fx"), calibration.number("fy")
             values |= {"f": fy, "b1": fx - fy, "b2": calibration.number("skew", 0.0)}
-            values |= {
-                "cx": calibration.number("cx") - width / 2,
-                "cy": calibration.number("cy") - height / 2,
-            }
+            values["cx"] = calibration.number("cx") - width / 2
+            values["cy"] = calibration.number("cy") - height / 2
             if values["p1"] or values["p2"]:
                 messages.append(Message(phrase("agisoft.exchanged", camera=name)))
     model, further = f"agisoft_{kind}", [values.pop(term, 0.0) for term in _TERMS[-2:]]
@@ -165,10 +157,8 @@ def _with_poses(
     Returns the system of references; None if they cannot be transformed.
     """
     whole = _similarity(chunk.child("transform")) or (np.eye(3), np.zeros(3), 1.0)
-    components = {
-        each.attributes.get("id"): _similarity(each.child("transform"))
-        for each in _members(chunk, "components", "component")
-    }
+    parts = _members(chunk, "components", "component")
+    components = {each.attributes.get("id"): _similarity(each.child("transform")) for each in parts}
     centres, matrices = np.empty((len(shots), 3)), np.empty((len(shots), 3, 3))
     for row, each in enumerate(shots):
         transform = each.need("transform")
@@ -239,9 +229,8 @@ def _markers(
                     block.image(photo, point, each.attribute("x"), each.attribute("y"))
 
 
-LOCAL_SYSTEM = (
-    'LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],UNIT["metre",1,AUTHORITY["EPSG","9001"]]]'
-)
+_METRE = 'UNIT["metre",1,AUTHORITY["EPSG","9001"]]'
+LOCAL_SYSTEM = f'LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],{_METRE}]'
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
@@ -264,8 +253,6 @@ def write(project: Project) -> Mapping[str, bytes]:
         raise InputError(phrase("format.poses"))
     frame, rotation, translation = project.frame, np.eye(3), np.zeros(3)
     if frame.origin is not None and frame.kind == "topocentric":
-        from photogram.formats.crs import east_north_up, from_frame
-
         rotation = east_north_up(frame.origin).T
         translation = from_frame(EARTH, np.zeros((1, 3)), np.zeros((1, 3, 3)), frame)[0][0]
     system = (GEOGRAPHIC if _is_placed(frame) else LOCAL_SYSTEM).replace('"', "&quot;")
@@ -299,10 +286,7 @@ def _is_placed(frame: Frame) -> bool:
 
 
 def _references(frame: Frame, xyz: Floats, covariances: Floats) -> tuple[Floats, Floats]:
-    """Return positions and standard deviations in the system of references."""
     if _is_placed(frame) and len(xyz):
-        from photogram.formats.crs import from_frame
-
         xyz, covariances = from_frame(GEOGRAPHIC, xyz, covariances, frame)
     return xyz, np.sqrt(np.einsum("nii->ni", covariances))
 
@@ -344,17 +328,12 @@ def _written_shots(project: Project, which: list[int]) -> list[str]:
     block = project.block
     turns = attitude_matrices(block) @ Y_DOWN
     given = block.observations.of_type(Position)
-    positions, sd = _references(
-        project.frame,
-        np.array([each.observed[:3] for each in given]).reshape(-1, 3),
-        np.array([each.precision for each in given]).reshape(-1, 3, 3),
-    )
-    references = {
-        each.photo: _written_reference(position, deviation)
-        for each, position, deviation in zip(given, positions, sd, strict=True)
-    }
+    observed = np.array([each.observed[:3] for each in given]).reshape(-1, 3)
+    precisions = np.array([each.precision for each in given]).reshape(-1, 3, 3)
+    written = map(_written_reference, *_references(project.frame, observed, precisions))
+    references = dict(zip((each.photo for each in given), written, strict=True))
     lines = [f'<cameras next_id="{len(block.photo_ids)}" next_group_id="0">']
-    for row in np.flatnonzero(known_poses(project.block)).tolist():
+    for row in np.flatnonzero(known_poses(block)).tolist():
         name = block.photo_ids[row]
         transform = np.eye(4)
         transform[:3, :3], transform[:3, 3] = turns[row], block.photo_positions[row]

@@ -13,6 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
+from photogram.formats.crs import enu_origin
 from photogram.formats.description import agreement
 from photogram.formats.format import FORMATS
 from photogram.formats.images import Y_DOWN, checked_rotation, lens_with, pixel_rows, sizes_of
@@ -119,7 +120,12 @@ def _camera(element: Element, size: Size, axes: Floats, pixel: float | None, nam
         cx, cy = cx + right, cy - up
     elif point is not None:
         cx, cy = point.number("x") + CENTER, point.number("y") + CENTER
-    terms = _terms(element)
+    terms, distortion = dict.fromkeys(_TERMS, 0.0), element.child("Distortion")
+    for each in () if distortion is None else distortion.children:
+        if each.name in _TERMS:
+            terms[each.name] = each.value
+        elif each.text.strip() not in ("", "0", "0.0", "false"):
+            one_word(each, "term of the distortion", each.name, _TERMS)
     fy, skew = f * element.number("AspectRatio", 1.0), element.number("Skew", 0.0)
     if skew:
         offsets = {"cx": cx - size[0] / 2, "cy": cy - size[1] / 2, "w": float(size[0]), "h": float(size[1])}
@@ -127,19 +133,6 @@ def _camera(element: Element, size: Size, axes: Floats, pixel: float | None, nam
         return Camera("agisoft_frame", {"f": fy, "b1": f - fy, "b2": skew, **offsets, **own}, name=name)
     own = {_TERMS[term]: value for term, value in terms.items()}
     return Camera("full_opencv", {"fx": f, "fy": fy, "cx": float(cx), "cy": float(cy), **own}, name=name)
-
-
-def _terms(element: Element) -> dict[str, float]:
-    found = dict.fromkeys(_TERMS, 0.0)
-    distortion = element.child("Distortion")
-    if distortion is None:
-        return found
-    for each in distortion.children:
-        if each.name in _TERMS:
-            found[each.name] = each.value
-        elif each.text.strip() not in ("", "0", "0.0", "false"):
-            one_word(each, "term of the distortion", each.name, _TERMS)
-    return found
 
 
 def _photo(found: _Reader, element: Element, srs: str) -> None:
@@ -237,8 +230,6 @@ def _project(block: _Reader, srs: str) -> Project:
     first = next((crs for _, _, crs in block.poses.values()), "")
     block.define_systems(system)
     if main := system(srs or first):
-        from photogram.formats.crs import enu_origin
-
         if (origin := enu_origin(main)) is None:
             block.frame_amid(main)
         else:
@@ -304,11 +295,8 @@ def write(project: Project) -> Mapping[str, bytes]:
     definition = 'LOCAL_CS["Local",UNIT["metre",1]]'
     if project.frame.kind == "topocentric" and project.frame.origin is not None:
         definition = "ENU:{!r},{!r},{!r}".format(*project.frame.origin)
-    lines = [
-        '<?xml version="1.0" encoding="utf-8"?>',
-        '<BlocksExchange version="2.1">',
-        "<SpatialReferenceSystems>",
-    ]
+    lines = ['<?xml version="1.0" encoding="utf-8"?>', '<BlocksExchange version="2.1">']
+    lines.append("<SpatialReferenceSystems>")
     lines += [f"<SRS><Id>0</Id><Name>frame</Name><Definition>{escape(definition)}</Definition></SRS>"]
     lines += ["</SpatialReferenceSystems>", "<Block>", f"<Name>{_text(block.title or 'block')}</Name>"]
     lines += ["<Type>Aerial</Type>", "<SRSId>0</SRSId>", "<Photogroups>"]
@@ -361,13 +349,8 @@ def _written_photo(
         pose += f"<Center>{_xyz(centre)}<Accurate>true</Accurate></Center>"
     if name in gnss:
         pose += f"<Metadata><SRSId>0</SRSId><Center>{_xyz(gnss[name])}</Center></Metadata>"
-    return [
-        "<Photo>",
-        f"<Id>{photo}</Id>",
-        f"<ImagePath>{escape(name)}</ImagePath>",
-        *([f"<Pose>{pose}</Pose>"] if pose else []),
-        "</Photo>",
-    ]
+    poses = [f"<Pose>{pose}</Pose>"] if pose else []
+    return ["<Photo>", f"<Id>{photo}</Id>", f"<ImagePath>{escape(name)}</ImagePath>", *poses, "</Photo>"]
 
 
 def _points(project: Project) -> list[str]:

@@ -14,6 +14,7 @@ from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.arrays import is_covariance, repeated_pairs
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.crs import amid, to_frame, turn_to_frame
 from photogram.formats.project import Project, Repeated, Size
 from photogram.io.places import Failing, Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
@@ -174,15 +175,11 @@ class BlockBuilder:
                 self.photo_ids.append(name)
                 self.photo_cameras.append(owners.get(reference, self.photo_cameras[row]))
                 stands.append((centres[row] - matrix @ sensor.position, matrix))
-            self.mounts += [
-                Mount(self.photo_ids[row], name, frame.rig.sensors[camera])
-                for camera, row in frame.photos.items()
-                if camera != reference
-            ]
-        self._poses = (
-            np.vstack([centres, *(centre for centre, _ in stands)]),
-            np.concatenate([matrices, *(matrix[np.newaxis] for _, matrix in stands)]),
-        )
+            for camera, row in frame.photos.items():
+                if camera != reference:
+                    self.mounts.append(Mount(self.photo_ids[row], name, frame.rig.sensors[camera]))
+        centres = np.vstack([centres, *(centre for centre, _ in stands)])
+        self._poses = centres, np.concatenate([matrices, *(matrix[np.newaxis] for _, matrix in stands)])
         free = np.full((len(stands), 3), np.inf)
         if np.ndim(self.position_sd):
             self.position_sd = np.vstack([self.position_sd, free])
@@ -272,8 +269,6 @@ class BlockBuilder:
                 located[key] = each._replace(crs=system(each.crs))
 
     def frame_amid(self, crs: str) -> None:
-        from photogram.formats.crs import amid
-
         centres = np.array([centre for centre, _, own in self.poses.values() if own == crs]).reshape(-1, 3)
         known = centres[np.isfinite(centres).all(axis=1)]
         if not len(known):
@@ -350,8 +345,6 @@ class BlockBuilder:
             if own and crs != self.crs:
                 given = centres[own]
                 centres[own], _ = self._in_frame(crs, given, np.zeros((len(own), 3, 3)))
-                from photogram.formats.crs import turn_to_frame
-
                 matrices[own] = turn_to_frame(crs, given, self.frame) @ matrices[own]
         return centres, matrices
 
@@ -359,11 +352,8 @@ class BlockBuilder:
         if crs == self.crs:
             return xyz, covariances
         if not crs or self.crs == "":
-            raise self.place.error(
-                phrase("blocks-exchange.systems", crs=crs or "local", frame=str(self.frame))
-            )
-        from photogram.formats.crs import to_frame
-
+            fields = {"crs": crs or "local", "frame": str(self.frame)}
+            raise self.place.error(phrase("blocks-exchange.systems", **fields))
         xyz, covariances, remarks = to_frame(crs, xyz, covariances, self.frame)
         known = {message.phrase for message in self.messages}
         if self.remarks_on_systems:
@@ -426,10 +416,9 @@ class BlockBuilder:
                     found += self._located({photo: each})
                 except InputError:
                     lost.append(names[photo])
-        self.observations += [
-            Position(names[photo], xyz, covariance=(covariance + covariance.T) / 2)
-            for photo, _, xyz, covariance in found
-        ]
+        for photo, _, xyz, covariance in found:
+            position = Position(names[photo], xyz, covariance=(covariance + covariance.T) / 2)
+            self.observations.append(position)
         if lost:
             self.messages.append(Message(phrase("blocks-exchange.gnss", n=len(lost), names=lost)))
 
@@ -437,18 +426,15 @@ class BlockBuilder:
         """Return the fields of the block for images, and repeated observations, which are omitted."""
         photos, points, xy, sd = (*self.image_rows(), None) if self._images is None else self._images
         left = repeated_pairs(photos, points, len(self.point_ids))
-        repeated = Repeated(
-            tuple(self.photo_ids[row] for row in photos[left].tolist()),
-            tuple(self.point_ids[row] for row in points[left].tolist()),
-            np.asarray(xy)[left],
-        )
+        photo_names = tuple(self.photo_ids[row] for row in photos[left].tolist())
+        point_names = tuple(self.point_ids[row] for row in points[left].tolist())
+        repeated = Repeated(photo_names, point_names, np.asarray(xy)[left])
         if len(left):
             photos, points = np.delete(photos, left), np.delete(points, left)
             xy = np.delete(xy, left, axis=0)
             if sd is not None and np.ndim(sd):
                 sd = np.delete(sd, left, axis=0)
-            pairs = zip(repeated.points, repeated.photos, strict=True)
-            names = [f"{point} on {photo}" for point, photo in pairs]
+            names = [f"{point} on {photo}" for point, photo in zip(point_names, photo_names, strict=True)]
             remark = Message.of("read.repeated", n=len(left), names=names, option=Phrase("option.repeated"))
             self.messages.append(remark)
         if sd is None:
@@ -464,7 +450,6 @@ class BlockBuilder:
 
 
 def _add(rows: dict[Hashable, int], key: Hashable, what: str, place: Failing) -> None:
-    """Add a key of an object with its row."""
     if key in rows:
         raise place.error(phrase("format.repeated", what=what, name=str(key)))
     rows[key] = len(rows)

@@ -57,9 +57,8 @@ def one_file(path: Path, suffix: str) -> Path | None:
     """Return the only file of a suffix in a folder, in any case; None without."""
     found = [each for each in sorted(path.iterdir()) if each.suffix.lower() == suffix and each.is_file()]
     if len(found) > 1:
-        raise InputError(
-            phrase("format.several", name=suffix, names=[file.name for file in found]), file=path
-        )
+        names = [file.name for file in found]
+        raise InputError(phrase("format.several", name=suffix, names=names), file=path)
     return found[0] if found else None
 
 

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools
+from photogram.collection.collection import Collection
+from photogram.collection.formats import bal, bundler
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.format import FORMATS
@@ -29,18 +30,12 @@ from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
 from photogram.words import Phrase, phrase
 
-if TYPE_CHECKING:
-    from photogram.collection.collection import Collection
-
 FILE, LIST = "bundle.out", "list.txt"
 PROBLEM = "problem.txt"
 
 
 def read_bundler(path: Path, options: ReadOptions) -> Project:
     """Read a Bundle file of version 0.3, and the list of photos in its folder."""
-    from photogram.collection.formats import bundler
-
-    del options
     place = bundle_of(path)
     found = bundler.read(place, pieces(place))
     count = len(found.photo_parameters)
@@ -58,24 +53,17 @@ def read_bundler(path: Path, options: ReadOptions) -> Project:
 
 
 def write_bundler(project: Project) -> Mapping[str, bytes]:
-    from photogram.collection.formats import bundler
-
     found, names = collection_of(project)
     return {FILE: bundler.to_bytes(found), LIST: "".join(f"{name}\n" for name in names).encode()}
 
 
 def read_bal(path: Path, options: ReadOptions) -> Project:
     """Read a problem, optionally packed; photos and points have numbers."""
-    from photogram.collection.formats import bal
-
-    del options
     found = bal.read(path, pieces(path))
     return project_of(found, path, FORMATS["bal"].title, range(len(found.photo_parameters)))
 
 
 def write_bal(project: Project) -> Mapping[str, bytes]:
-    from photogram.collection.formats import bal
-
     return {PROBLEM: bal.to_bytes(collection_of(project)[0])}
 
 
@@ -119,8 +107,6 @@ def _reduced(camera: Camera, size: Size | None) -> tuple[float, float, float] | 
 
 
 def collection_of(project: Project) -> tuple[Collection, list[str]]:
-    from photogram.collection.collection import Collection
-
     block, positions, oriented = project.block, complete_positions(project), known_poses(project.block)
     cameras, photo_cameras = known_cameras(block)
     placed: Bools = np.asarray(np.isfinite(positions).all(axis=1))
@@ -128,11 +114,8 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
     if not len(rows):
         raise InputError(phrase("format.no-images"))
     # Image coordinates from the centre, reduced to f, k1, k2
-    xy, directions, lenses = (
-        block.image_xy.copy(),
-        image_directions(block),
-        list[tuple[float, float, float]](),
-    )
+    xy, directions = block.image_xy.copy(), image_directions(block)
+    lenses = list[tuple[float, float, float]]()
     for row, (camera, size) in enumerate(zip(cameras, project.sizes, strict=True)):
         own, lens = np.asarray(photo_cameras)[block.image_photos] == row, _reduced(camera, size)
         lenses.append(lens or (camera.scale, 0.0, 0.0))
@@ -144,15 +127,11 @@ def collection_of(project: Project) -> tuple[Collection, list[str]]:
     rows = rows[np.isfinite(xy[rows]).all(axis=1)]
     photos, of_photo, of_point = np.flatnonzero(oriented), np.cumsum(oriented) - 1, np.cumsum(placed) - 1
     to_photo = attitude_matrices(block)[photos].transpose(0, 2, 1)
-    parameters = np.hstack(
-        [
-            _photocore.rotation_vectors(np.ascontiguousarray(to_photo)),
-            -np.einsum("nij,nj->ni", to_photo, block.photo_positions[photos]),
-            np.array([lenses[photo_cameras[row]] for row in photos]).reshape(-1, 3),
-        ]
-    )
+    vectors = _photocore.rotation_vectors(np.ascontiguousarray(to_photo))
+    translations = -np.einsum("nij,nj->ni", to_photo, block.photo_positions[photos])
+    of_lenses = np.array([lenses[photo_cameras[row]] for row in photos]).reshape(-1, 3)
     found = Collection(
-        photo_parameters=parameters,
+        photo_parameters=np.hstack([vectors, translations, of_lenses]),
         point_positions=positions[placed],
         image_photos=of_photo[block.image_photos[rows]],
         image_points=of_point[block.image_points[rows]],

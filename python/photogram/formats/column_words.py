@@ -20,7 +20,6 @@ ROLE = "use"  # Column of the roles: control or check
 
 
 def _declared() -> dict[str, dict[str, str]]:
-    """Return the meaning of each word by the kind of its row."""
     found: dict[str, dict[str, str]] = {}
     for kind, meaning, _, words in declared(__file__, "headings.csv"):
         for word in words.split(", "):

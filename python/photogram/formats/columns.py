@@ -27,7 +27,7 @@ from photogram.formats.column_words import (
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.io.delimited import NAMELESS
 from photogram.io.numbers import finite_number, scaled
-from photogram.io.places import one_word
+from photogram.io.places import Place, one_word
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.words import Phrase, phrase, quoted
@@ -84,12 +84,9 @@ class Columns:
     def spelled(self, known: Collection[str], own: Sequence[str]) -> list[str]:
         """Return the internal names of all columns from the headings of a file."""
         names = [""] * len(own)
-        for column, heading in self.headings.items():
+        for column, heading in (*self.headings.items(), *((each, each) for each in self.ignored)):
             for place in _places(heading, own):
                 names[place] = column
-        for heading in self.ignored:
-            for place in _places(heading, own):
-                names[place] = heading
         taken = {*names, *(each for each in own if each in known)}
         # A heading of photos has precedence over one that names anything.
         for k in sorted(range(len(own)), key=lambda k: not is_photo(own[k])):
@@ -106,9 +103,8 @@ class Columns:
                 column = "photo"
             elif column not in known:
                 column = WORDS["pixel"].get(" ".join(words_of(heading)), column)
-            fits = (column in known and (column != ROLE or "cov_xz" in known)) or (
-                column == "sd_xy" and "sd_x" in known
-            )
+            fits = column in known and (column != ROLE or "cov_xz" in known)
+            fits |= column == "sd_xy" and "sd_x" in known
             first = column not in taken or column not in ("point", "photo", "column", "row", ROLE)
             names[k] = column if fits and first and column not in self.headings else heading
             taken.add(names[k])
@@ -140,9 +136,7 @@ def columns_given(columns: str | None, roles: str | None) -> Columns:
     for word in words:
         name, equals, heading = (each.strip() for each in word.partition("="))
         if name.lower() != "-" and name.lower() not in OURS:
-            raise InputError(
-                phrase("format.unknown", what="column in --columns", value=name, names=list(OURS))
-            )
+            one_word(Place(), "column in --columns", name, OURS)
         if not equals:
             order.append(name.lower())
         elif name == "-":
@@ -171,17 +165,15 @@ def settled(
     messages: list[Message],
 ) -> ColumnTable:
     """Return a table of points with standard column names, units and role words."""
-    missing = [
-        each for each in (*columns.headings.values(), *columns.ignored) if not _places(each, table.own)
-    ]
+    users = (*columns.headings.values(), *columns.ignored)
+    missing = [each for each in users if not _places(each, table.own)]
     if missing and not columns.order:
         one_word(table.head, "heading in --columns", missing[0], table.own)
     if "point" in required:
         table = _with_points(table, names, messages)
     if lacking := [each for each in required if each not in table]:
-        raise table.head.error(
-            phrase("columns.missing", name=lacking[0], names=list(table.own), option=guess(table, known))
-        )
+        fields = {"name": lacking[0], "names": list(table.own), "option": guess(table, known)}
+        raise table.head.error(phrase("columns.missing", **fields))
     if name == "control":
         table = _with_roles(table, columns, messages)
     table = in_units(table, units, name, messages, columns.headings)
@@ -197,12 +189,8 @@ def settled(
             cells[column] = -table.numbers(column)
     wide = tuple(each for each in ("sd_x", "sd_y") if each in cells and each not in table.columns)
     check_unread(table, columns, known, name, messages)
-    return replace(
-        table,
-        cells=cells,
-        columns=(*table.columns, *wide),
-        own=(*(table.own or table.columns), *("" for _ in wide)),
-    )
+    names = (*(table.own or table.columns), *("" for _ in wide))
+    return replace(table, cells=cells, columns=(*table.columns, *wide), own=names)
 
 
 def in_units(

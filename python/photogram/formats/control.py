@@ -87,7 +87,8 @@ def _of_text(path: Path) -> ControlList:
         position = (words[0], words[1], height)
         named = words[6:7] or [by_position.setdefault(position, f"control {len(by_position) + 1}")]
         name = named[0]
-        if points.setdefault(name, position) != position and _apart(points[name], position):
+        pairs = zip(points.setdefault(name, position), position, strict=True)
+        if any((a == "") != (b == "") or (a and abs(float(a) - float(b)) > DIFFER) for a, b in pairs):
             raise place.error(phrase("control-list.position", point=name, record=places[name]))
         places.setdefault(name, place.record or 0)
         # Pixels count from the centre of the first pixel.
@@ -98,11 +99,6 @@ def _of_text(path: Path) -> ControlList:
         raise head.error(phrase("format.missing", what="points"))
     control = _table(head, _POINTS, [(name, *own) for name, own in points.items()], [*places.values()])
     return ControlList(control, _table(head, _IMAGES, images, records), crs, [])
-
-
-def _apart(one: tuple[str, str, str], other: tuple[str, str, str]) -> bool:
-    pairs = zip(one, other, strict=True)
-    return any((a == "") != (b == "") or (a and abs(float(a) - float(b)) > DIFFER) for a, b in pairs)
 
 
 def _of_json(path: Path, project: Project) -> ControlList:
@@ -139,7 +135,6 @@ def _of_json(path: Path, project: Project) -> ControlList:
 def _table(
     head: Place, columns: Sequence[str], rows: Sequence[tuple[str, ...]], records: Sequence[int]
 ) -> ColumnTable:
-    """Return rows of cells as the table of a file."""
     assert head.file is not None
     cells = {name: [row[k] for row in rows] for k, name in enumerate(columns)}
     return ColumnTable(head.file, head, tuple(columns), len(rows), cells, records)
@@ -201,10 +196,8 @@ def check_systems(
             if below and not above:
                 return [Message(phrase("control-system.below", option=_swap(table)), table.path)]
         return []
-    tried = [
-        (misfit(settings, change(values))[0], what, option)
-        for what, option, change in (_exchanges(table, values, free=free) if firm else ())
-    ]
+    exchanges = _exchanges(table, values, free=free) if firm else ()
+    tried = [(misfit(settings, change(values))[0], what, option) for what, option, change in exchanges]
     for crs in _systems(project, settings):
         apart, _ = misfit(replace(settings, crs={"control": crs}), values)
         tried.append((apart, phrase("control-system.crs", crs=crs), f"--control-crs {crs}"))

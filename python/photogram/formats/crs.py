@@ -223,8 +223,7 @@ def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
         found: Floats = (earth - _geocentric_of(local)) @ east_north_up(local).T
     else:
         found = _transformed(GEOCENTRIC, _with_heights(crs), earth) - _geoid(crs)
-    turns: Floats = _axes(crs, found, earth) @ own.transpose(0, 2, 1)
-    return found, turns
+    return found, np.asarray(_axes(crs, found, earth) @ own.transpose(0, 2, 1))
 
 
 def is_on(crs: str, ellipsoid: tuple[float, float]) -> bool:
@@ -238,12 +237,8 @@ def is_on(crs: str, ellipsoid: tuple[float, float]) -> bool:
 
 def has_place(frame: Frame) -> bool:
     """Return whether the position of a frame on the earth is known."""
-    return (
-        (frame.kind == "topocentric" and frame.origin is not None)
-        or frame.kind == "geocentric"
-        or (frame.kind == "geographic" and bool(_geographic(frame)))
-        or (frame.kind == "cartesian" and bool(frame.crs))
-    )
+    places = {"topocentric": frame.origin, "geographic": _geographic(frame), "cartesian": frame.crs}
+    return frame.kind == "geocentric" or bool(places.get(frame.kind))
 
 
 def _geographic(frame: Frame) -> str:

@@ -111,10 +111,8 @@ def _size(project: Project) -> tuple[Facts, dict[str, Any]]:
 def _cameras(project: Project) -> Table:
     cameras, which = known_cameras(project.block)
     sizes = [*project.sizes, *[None] * len(cameras)][: len(cameras)]
-    values = [
-        ", ".join(f"{name} {significant(value, 7)}" for name, value in each.parameters.items() if value)
-        for each in cameras
-    ]
+    given = [{name: value for name, value in each.parameters.items() if value} for each in cameras]
+    values = [", ".join(f"{name} {significant(value, 7)}" for name, value in own.items()) for own in given]
     columns = [
         of_each(cameras, "title", kind="name", name="name", head="Camera"),
         of_each(cameras, "model", kind="name", name="model", head="Model"),
@@ -145,6 +143,7 @@ def _trajectories(project: Project) -> list[Facts | Table]:
         facts.append(Fact("Times", str(settings.times)))
     moments = [(each.moment.trajectory, each.label) for each in block.observations if each.moment is not None]
     kinds_on = [Counter(label for one, label in moments if one is each) for each in shared]
+    counted_kinds = [listed([f"{n} {kind}" for kind, n in each.items()]) for each in kinds_on]
     columns = [
         of_each(shared, "name", kind="name", name="name", head="Trajectory"),
         column("photos", [sum(one.trajectory is each for one in block.timed) for each in shared], "Photos"),
@@ -161,11 +160,7 @@ def _trajectories(project: Project) -> list[Facts | Table]:
             )
             for k, (name, head) in enumerate({"position": "Position", "rotation": "Rotation"}.items())
         ),
-        Quantity(
-            [listed([f"{n} {kind}" for kind, n in each.items()]) for each in kinds_on],
-            kind="name",
-            head="Observations",
-        ),
+        Quantity(counted_kinds, kind="name", head="Observations"),
         Quantity([dict(each) for each in kinds_on], member="observations"),
     ]
     hidden = len(shared) - MOST_TRAJECTORIES
@@ -250,13 +245,9 @@ def agreement(project: Project) -> Agreement:
         if own.sensor is not None:
             places[of_photo] += turned @ own.sensor.position
             axes[of_photo] = turned @ own.sensor.attitude
-    return Agreement(
-        cameras,
-        np.asarray(photo_cameras, dtype=np.int64)[photos],
-        points[block.image_points[rows]] - places,
-        axes.transpose(0, 2, 1),
-        xy,
-    )
+    which = np.asarray(photo_cameras, dtype=np.int64)[photos]
+    vectors = points[block.image_points[rows]] - places
+    return Agreement(cameras, which, vectors, axes.transpose(0, 2, 1), xy)
 
 
 def doubts(project: Project) -> list[Message]:

@@ -10,6 +10,9 @@ from photogram.errors import InputError, message_of
 from photogram.formats.format import FORMATS
 from photogram.formats.project import Project, frame_of
 from photogram.formats.read_options import ReadOptions
+from photogram.giant import Project as GiantProject
+from photogram.giant import read_project
+from photogram.giant.assembly import job_refraction
 from photogram.giant.files import to_bytes
 from photogram.messages import Message
 from photogram.words import Phrase, phrase
@@ -17,10 +20,6 @@ from photogram.words import Phrase, phrase
 
 def read(path: Path, options: ReadOptions) -> Project:
     """Read a project, with the refraction of its COMMON."""
-    from photogram.giant import read_project  # detection of formats does not need the cards
-    from photogram.giant.assembly import job_refraction
-
-    del options
     found = read_project(path)
     block = found.to_block().replace(refraction=job_refraction(found.common))
     messages = list(found.messages)
@@ -37,15 +36,11 @@ def read(path: Path, options: ReadOptions) -> Project:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    from photogram.giant import Project as GiantProject
-
     records = GiantProject.from_block(project.block).records()
     return {name: to_bytes(lines) for name, lines in records.items()}
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
-    from photogram.giant import Project as GiantProject
-
     try:
         GiantProject.from_block(project.block)
     except InputError as error:

@@ -177,20 +177,19 @@ def write_marks(project: Project) -> dict[str, bytes]:
     photos: dict[str, dict[str, Floats]] = {}
     for each in films.readings:
         photos.setdefault(each.photo, {})[films.by_mark[id(each.mark)]] = each.observed[:2]
-    files = {
-        f"{SCANS}/MeasuresIm-{photo}.xml": _document(photo, own, whole=True) for photo, own in photos.items()
-    }
     names = "".join(f"{name}\n" for name in places).encode()
-    return {NAMES: names, f"{SCANS}/{CAMERA}": _document("Glob", places, whole=False)} | files
+    files = {NAMES: names, f"{SCANS}/{CAMERA}": _document("Glob", places, whole=False)}
+    for photo, own in photos.items():
+        files[f"{SCANS}/MeasuresIm-{photo}.xml"] = _document(photo, own, whole=True)
+    return files
 
 
 def _document(image: str, marks: Mapping[str, Floats], *, whole: bool) -> bytes:
     lines = [f"<{OF_IMAGE}>", f"<NameIm>{escape(image)}</NameIm>"]
     for name, xy in marks.items():
         x, y = xy.tolist()
-        lines.append(
-            f"<OneMesureAF1I><NamePt>{escape(name)}</NamePt><PtIm>{x!r} {y!r}</PtIm></OneMesureAF1I>"
-        )
+        place = f"<NamePt>{escape(name)}</NamePt><PtIm>{x!r} {y!r}</PtIm>"
+        lines.append(f"<OneMesureAF1I>{place}</OneMesureAF1I>")
     lines.append(f"</{OF_IMAGE}>")
     if whole:
         lines = [f"<{SET}>", *lines, f"</{SET}>"]

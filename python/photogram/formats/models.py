@@ -21,12 +21,7 @@ from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
 from photogram.network.films import Scan
 from photogram.network.frame import Frame
-from photogram.network.geometry import (
-    Cartesian,
-    Spheroid,
-    lengths_of_units,
-    local_frames,
-)
+from photogram.network.geometry import Cartesian, Spheroid, lengths_of_units, local_frames
 from photogram.network.motion import on_shared, scanners
 from photogram.network.observations import Control, Position
 from photogram.network.rays import LocalAxes, meet_rays
@@ -38,10 +33,8 @@ def known_cameras(block: Block) -> tuple[list[Camera], list[int]]:
     """Return cameras (also for principal distances), and the one of each photo."""
     if block.cameras:
         assert block.photo_cameras is not None
-        cameras = [
-            each if each.name else each.replace(name=name)
-            for each, name in zip(block.cameras, block.camera_names, strict=True)
-        ]
+        pairs = zip(block.cameras, block.camera_names, strict=True)
+        cameras = [each if each.name else each.replace(name=name) for each, name in pairs]
         return cameras, block.photo_cameras.tolist()
     distances = block.known_distances("the file").tolist()
     places = {each: row for row, each in enumerate(dict.fromkeys(distances))}
@@ -136,16 +129,11 @@ def carried(project: Project, by: tuple[float, Floats, Floats], frame: Frame, me
     """Return a project transformed by scale, (3, 3) rotation, (3,) translation."""
     block = project.block
     scale, turn, shift = by
-    return project.replace(
-        block=block.replace(
-            photo_positions=scale * block.photo_positions @ turn.T + shift,
-            photo_attitudes=known_angles("omega_phi_kappa", turn @ attitude_matrices(block)),
-            photo_to_ground=False,
-        ),
-        starts=scale * project.starts @ turn.T + shift,
-        frame=frame,
-        messages=(*project.messages, message),
-    )
+    positions = scale * block.photo_positions @ turn.T + shift
+    angles = known_angles("omega_phi_kappa", turn @ attitude_matrices(block))
+    moved = block.replace(photo_positions=positions, photo_attitudes=angles, photo_to_ground=False)
+    starts = scale * project.starts @ turn.T + shift
+    return project.replace(block=moved, starts=starts, frame=frame, messages=(*project.messages, message))
 
 
 def chosen_model(

@@ -30,10 +30,8 @@ def with_names(project: Project, path: Path) -> Project:
     table = read_columns(path, known=("point", "name"))
     table.require("point", "name")
     old = project.block.point_ids
-    rows, names = (
-        indices_of(table, "point", {name: row for row, name in enumerate(old)}, "point"),
-        table.texts("name"),
-    )
+    rows = indices_of(table, "point", {name: row for row, name in enumerate(old)}, "point")
+    names = table.texts("name")
     table.names("name")
     new = {old[place]: name for place, name in zip(rows.tolist(), names, strict=True)}
     taken: dict[str, int] = {}

@@ -106,12 +106,10 @@ def write(project: Project) -> Mapping[str, bytes]:
     block = project.block
     cameras, which = known_cameras(block)
     owners = [cameras[row].name for row in which]
-    photos, points, names = (
-        np.array(own, dtype=object) for own in (block.photo_ids, block.point_ids, owners)
-    )
+    photos, names = np.array(block.photo_ids, dtype=object), np.array(owners, dtype=object)
     columns = {
         "photo": photos[block.image_photos],
-        "point": points[block.image_points],
+        "point": np.array(block.point_ids, dtype=object)[block.image_points],
         **columns_of(("column", "row"), to_corner(project)),
         **columns_of(("sd_column", "sd_row"), block.image_sd),
         "camera": names[block.image_photos],

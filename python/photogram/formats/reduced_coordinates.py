@@ -55,9 +55,9 @@ class ReducedBuilder(BlockBuilder):
         super().__init__(path, title)
         self.sd, self.unit_of_angles, self.names = options.sd, options.angles, names or {}
 
-    def name(self, card: Card, index: int = 0) -> str:
-        """Return the name of a word."""
-        return self.names.get(card.words[index], card.words[index])
+    def name(self, card: Card) -> str:
+        """Return the name of the first word."""
+        return self.names.get(card.words[0], card.words[0])
 
     def add_images(self, add: Callable[[str, Card], None], unit: float, *, ends_empty: bool) -> None:
         """Add the photos of the image file, each with the observations up to an end mark or empty line."""
@@ -135,10 +135,9 @@ def with_fitting_rotations(project: Project) -> Project:
 
 def _misfit(project: Project) -> float:
     """Return the median residual of intersections; infinite behind photos."""
-    loose = project.replace(
-        block=project.block.replace(point_positions=np.full_like(project.starts, np.nan), point_sd=np.inf),
-        starts=np.full_like(project.starts, np.nan),
-    )
+    unknown = np.full_like(project.starts, np.nan)
+    block = project.block.replace(point_positions=unknown, point_sd=np.inf)
+    loose = project.replace(block=block, starts=unknown)
     found = agreement(loose.replace(starts=complete_positions(loose)))
     return found.median if len(found.xy) else 0.0
 
@@ -167,9 +166,8 @@ def reduced_images(project: Project, digits: int | None = None) -> tuple[Floats,
     photos, rays = block.image_photos[rows], directions[rows]
     xy = distances[np.asarray(which, dtype=np.int64)[photos], np.newaxis] * rays[:, :2] / -rays[:, 2:]
     images: _Images = [[] for _ in block.photo_ids]
-    for photo, point, (x, y) in zip(
-        photos.tolist(), block.image_points[rows].tolist(), xy.tolist(), strict=True
-    ):
+    points = block.image_points[rows]
+    for photo, point, (x, y) in zip(photos.tolist(), points.tolist(), xy.tolist(), strict=True):
         images[photo].append((block.point_ids[point], x, y))
     return distances, images
 

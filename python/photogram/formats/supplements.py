@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns
+from photogram.formats.control import ControlList, check_systems, read_control_list
 from photogram.formats.crs import plane_remarks
 from photogram.formats.images import by_camera, from_corner, to_corner
 from photogram.formats.models import carried, intersected, is_free
@@ -39,9 +39,6 @@ from photogram.network.wider_models import (
 )
 from photogram.results.result import Result
 from photogram.words import OPTIONS_OF_CONTROL, Phrase, option_sd, phrase
-
-if TYPE_CHECKING:
-    from photogram.formats.control import ControlList
 
 SAME = 1e-3  # Largest difference (pixels) of equal observations of a point in a photo
 SIMILAR = 10.0  # Smallest improvement of the fit of control for which a similarity is applied to the model
@@ -167,8 +164,8 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
     if missing := sorted(wanted - used - {"all"}):
         names = sorted({name for camera in project.block.cameras for name in camera.names})
         raise InputError(phrase("error.unknown", kind="parameter of a camera", name=missing[0], names=names))
-    messages = (*project.messages, *messages)
-    return project.replace(block=project.block.replace(cameras=cameras), messages=messages)
+    block = project.block.replace(cameras=cameras)
+    return project.replace(block=block, messages=(*project.messages, *messages))
 
 
 def held_points(project: Project, wanted: Sequence[str]) -> Project:
@@ -236,9 +233,8 @@ def _with_list(project: Project, given: ControlList) -> Project:
     for name in project.block.photo_ids:
         plain.setdefault("_".join(name.split()), []).append(name)
     listed = given.images.texts("photo")
-    photos = [
-        name if name in exact else plain[name][0] if len(plain.get(name, ())) == 1 else "" for name in listed
-    ]
+    only = {name: names[0] for name, names in plain.items() if len(names) == 1}
+    photos = [name if name in exact else only.get(name, "") for name in listed]
     rows = [row for row, name in enumerate(photos) if name]
     if lost := sorted({own for own, name in zip(listed, photos, strict=True) if not name}):
         given.messages.append(Message.of("plain.other-photos", given.images.path, names=lost))
@@ -270,16 +266,17 @@ def with_control(
     crs: str | None,
     columns: Columns = PLAIN,
 ) -> Project:
-    from photogram.formats.control import check_systems, read_control_list
-
     listed = read_control_list(path, project)
     crs = crs or (listed.crs if listed else "")
-    own = {
-        "tables": {"control": path},
-        "crs": {"control": crs} if crs else {},
-        "columns": {"control": columns},
-    }
-    settings = Settings(path, frame=project.frame, length=project.block.linear_unit, sd=sd, **own)
+    settings = Settings(
+        path,
+        frame=project.frame,
+        length=project.block.linear_unit,
+        sd=sd,
+        tables={"control": path},
+        crs={"control": crs} if crs else {},
+        columns={"control": columns},
+    )
     tables = Tables(settings, listed.messages if listed else [], frozenset(project.block.point_ids))
     table = listed.control if listed else tables.rows("control")
     project = _with_list(project, listed) if listed else project

@@ -201,14 +201,11 @@ def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: 
     except UNPACKABLE as error:
         raise InputError(phrase("xml.packed", reason=str(error)), file=path) from None
     except xml.parsers.expat.ExpatError as error:
-        what = xml.parsers.expat.ErrorString(error.code)
-        raise InputError(
-            phrase("xml.syntax", reason=what, column=error.offset + 1), file=path, record=error.lineno
-        ) from None
+        fields = {"reason": xml.parsers.expat.ErrorString(error.code), "column": error.offset + 1}
+        raise Place(path, error.lineno).error(phrase("xml.syntax", **fields)) from None
     except (ValueError, LookupError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(
-            phrase("xml.syntax", reason=str(error), column=1), file=path, record=parser.CurrentLineNumber
-        ) from None
+        place = Place(path, parser.CurrentLineNumber)
+        raise place.error(phrase("xml.syntax", reason=str(error), column=1)) from None
     return first[0]

@@ -144,7 +144,7 @@ class Frame:
 class Model:
     """A model; without rigs and frames each camera is a rig.
 
-    `points` is a table of `POINT`, and `point_places` the locations of its rows in files.
+    `points` is a table of `POINT`, and `point_place` returns the location of a row in files.
     """
 
     path: Path
@@ -153,7 +153,7 @@ class Model:
     points: Table
     rigs: list[Rig] = field(default_factory=list)
     frames: list[Frame] = field(default_factory=list)
-    point_places: Sequence[Place] = ()
+    point_place: Callable[[int], Place] = lambda _: Place()
 
     @cached_property
     def numbers(self) -> Indices:
@@ -349,7 +349,7 @@ def read_model(folder: Path) -> Model:
     return model
 
 
-def _text_points(folder: Path) -> tuple[Table, Sequence[Place]]:
+def _text_points(folder: Path) -> tuple[Table, Callable[[int], Place]]:
     rows, places = [], []
     for place in filled_lines(folder / "points3D.txt"):
         line = _Line(place)
@@ -360,10 +360,10 @@ def _text_points(folder: Path) -> tuple[Table, Sequence[Place]]:
             raise place.error(phrase("colmap.groups", n=len(track), size=2, names=names))
         rows.append((number, xyz, rgb, error, len(track) // 2))
         places.append(place)
-    return np.array(rows, POINT), places
+    return np.array(rows, POINT), places.__getitem__
 
 
-def _binary_points(path: Path) -> tuple[Table, Sequence[Place]]:
+def _binary_points(path: Path) -> tuple[Table, Callable[[int], Place]]:
     file, size = _Bytes(path, POINT.itemsize), POINT.itemsize
     starts = np.empty(file.records, dtype=np.int64)
     unpack, data, last, at = struct.Struct("<Q").unpack_from, file.data, len(file.data), file.at
@@ -380,20 +380,7 @@ def _binary_points(path: Path) -> tuple[Table, Sequence[Place]]:
     for first in range(0, file.records, 1 << 16):
         part = starts[first : first + (1 << 16), np.newaxis] + np.arange(size)
         rows[first : first + (1 << 16)] = raw[part]
-    return rows.reshape(-1).view(POINT), _Places(path, file.records)
-
-
-class _Places(Sequence[Place]):
-    """Locations of records, created on demand."""
-
-    def __init__(self, path: Path, number: int) -> None:
-        self.path, self.number = path, number
-
-    def __len__(self) -> int:
-        return self.number
-
-    def __getitem__(self, row: int) -> Place:  # type: ignore[override]
-        return Place(self.path, row + 1)
+    return rows.reshape(-1).view(POINT), lambda row: Place(path, row + 1)
 
 
 def _values(record: Any) -> Iterator[tuple[str, tuple[Any, ...]]]:

@@ -210,10 +210,9 @@ def take_images(table: ColumnTable, content: DbatBuilder, sd: float = math.nan) 
     own = np.where(np.isnan(own), sd, own)
     for row in np.argwhere(own == 0)[:, 0].tolist():
         positive(table.at(row), "the standard deviation", 0)
-    photos, points = table.wholes("im").tolist(), table.wholes("id").tolist()
-    rows = zip(photos, points, table.given(("x", "y")).tolist(), own, strict=True)
-    for row, (photo, point, (x, y), deviations) in enumerate(rows):
-        content.image(photo, point, x, y, table.at(row), sd=deviations)
+    photos, points, xy = table.wholes("im").tolist(), table.wholes("id").tolist(), table.given(("x", "y"))
+    for row, (photo, point, (x, y)) in enumerate(zip(photos, points, xy.tolist(), strict=True)):
+        content.image(photo, point, x, y, table.at(row), sd=own[row])
 
 
 TITLE = "PhotoModeler export"
