@@ -238,12 +238,10 @@ def cannot_hold(project: Project) -> list[Phrase]:
     block, known = project.block, known_points(project)
     marked = np.isin(np.arange(len(block.point_ids)), np.array(known.rows, dtype=int)[_complete(known)])
     partial = np.isfinite(block.point_positions).any(axis=1) & ~marked
-    counts = {
-        "lost.ties": np.count_nonzero(~marked[block.image_points]),
-        "lost.partial-control": np.count_nonzero(partial),
-        "lost.geocentric-digits": np.count_nonzero(project.frame.kind in ("topocentric", "geocentric")),
-    }
-    return [phrase(code, n=int(count)) for code, count in counts.items() if count]
+    ties, parts = (int(np.count_nonzero(own)) for own in (~marked[block.image_points], partial))
+    far = int(project.frame.kind in ("topocentric", "geocentric"))
+    counts = {"lost.ties": ties, "lost.partial-control": parts, "lost.geocentric-digits": far}
+    return [phrase(code, n=count) for code, count in counts.items() if count]
 
 
 def write(project: Project) -> Mapping[str, bytes]:

@@ -39,8 +39,7 @@ class _Reader(BlockBuilder):
 
     def __init__(self, path: Path, control_sd: tuple[float, ...] | None) -> None:
         super().__init__(path, FORMATS["aicon"].title)
-        self.control_sd = control_sd
-        self.inactive: dict[str, set[str]] = {"photos": set(), "points": set()}
+        self.control_sd, self.inactive = control_sd, {"photos": set[str](), "points": set[str]()}
 
 
 def read(path: Path, options: ReadOptions) -> Project:
@@ -60,7 +59,7 @@ def read(path: Path, options: ReadOptions) -> Project:
             take(file, block)
     for kind, names in block.inactive.items():
         if names:
-            block.messages.append(Message(phrase("aicon.inactive", n=len(names), what=kind)))
+            block.messages.append(Message.of("aicon.inactive", n=len(names), what=kind))
     sd = np.array(block.image_sd)
     block.images(*block.image_rows(), sd if (sd > 0).all() else None)
     if not block.controls:

@@ -277,11 +277,7 @@ class BlockBuilder:
         self.messages.append(Message(phrase("format.frame", crs=crs, frame=self.frame.phrase)))
 
     def project(
-        self,
-        *,
-        options: AdjustOptions | None = None,
-        details: Mapping[str, Any] | None = None,
-        **fields: Any,
+        self, *, options: AdjustOptions | None = None, details: Mapping[str, Any] | None = None, **fields: Any
     ) -> Project:
         """Return the project; `fields` are other fields of the block.
 

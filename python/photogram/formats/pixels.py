@@ -26,6 +26,7 @@ from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
 from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns, read_head
+from photogram.io.places import positive
 from photogram.messages import Message
 from photogram.words import Phrase, phrase
 
@@ -94,10 +95,8 @@ def _sd(table: ColumnTable, options: ReadOptions) -> Floats | None:
     common = table.numbers("sd", default)
     found = table.vectors(("sd_column", "sd_row"))
     found = np.where(np.isnan(found), common[:, np.newaxis], found)
-    bad = np.flatnonzero(~(found > 0).all(axis=1))
-    if len(bad):
-        value = float(found[bad[0]].min())
-        raise table.error(int(bad[0]), phrase("format.positive", name="the standard deviation", value=value))
+    for row in np.flatnonzero(~(found > 0).all(axis=1))[:1].tolist():
+        positive(table.at(row), "the standard deviation", float(found[row].min()))
     return found
 
 

@@ -201,9 +201,8 @@ def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: 
     photos = indices_of(table, "photo", {name: row for row, name in enumerate(block.photo_ids)}, "photo")
     names = table.names("point")
     known = {name: row for row, name in enumerate(block.point_ids)}
-    new = [name for name in names.names if name not in known]
-    known |= {name: len(block.point_ids) + k for k, name in enumerate(new)}
-    points = np.array([known[name] for name in names.names], dtype=np.int64)[names.rows]
+    rows = [known.setdefault(name, len(known)) for name in names.names]
+    new, points = list(known)[len(block.point_ids) :], np.array(rows, dtype=np.int64)[names.rows]
     corner, which = corner_of(table, pixel_origin), block.photo_cameras[photos]
     xy = by_camera(corner, which, lambda row, own: from_corner(block.cameras[row], project.sizes[row], own))
     fill = np.full((len(new), 3), np.nan)

@@ -204,11 +204,7 @@ def _sides(element: Element, size: Size) -> tuple[float, float]:
 
 
 def _principal_point(
-    element: Element,
-    size: Size,
-    sides: tuple[float, float],
-    terms: dict[str, float],
-    messages: list[Message],
+    element: Element, size: Size, sides: tuple[float, float], terms: dict[str, float], messages: list[Message]
 ) -> tuple[float, float]:
     middle = size[0] / 2 * sides[0], size[1] / 2 * sides[1]
     if element.word("pp", "default") == "default":

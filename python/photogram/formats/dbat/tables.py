@@ -20,6 +20,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import Card
+from photogram.formats.plain.tables import check_rows
 from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
@@ -92,8 +93,8 @@ class DbatBuilder(BlockBuilder):
         middles = np.array(self.sizes)[cameras] / 2
         xy = (pixels - middles) * side * [1, -1]
         self.images(photos, points, xy, sd)
-        held = [[0.0 if number in self.held else np.inf] * 3 for number in self.photo_rows]
-        self.position_sd = self.attitude_sd = held
+        self.position_sd = [[0.0 if number in self.held else np.inf] * 3 for number in self.photo_rows]
+        self.attitude_sd = self.position_sd
         if self.free:
             self.cameras = [each.replace(sd=dict.fromkeys(self.free, np.inf)) for each in self.cameras]
         # Unique names: file names, with folders if necessary
@@ -191,15 +192,11 @@ def take_points(
 
 def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floats:
     """Return (rows, k) standard deviations; NaN without."""
-    whole = table.numbers(common) if common in table else np.full(table.count, math.nan)
+    whole, given = table.numbers(common), table.vectors(columns)
     flat = table.numbers("sxy") if "sxy" in table else whole
-    defaults = (flat, flat, whole)
-    own = [table.numbers(column) for column in columns]
-    found = np.column_stack(
-        [np.where(np.isnan(each), default, each) for each, default in zip(own, defaults, strict=False)]
-    )
-    if (found < 0).any():
-        raise table.error(int(np.argwhere(found < 0)[0][0]), phrase("format.negative"))
+    defaults = np.column_stack((flat, flat, whole))[:, : len(columns)]
+    found = np.where(np.isnan(given), defaults, given)
+    check_rows(table, (found < 0).any(axis=1), phrase("format.negative"))
     return found
 
 

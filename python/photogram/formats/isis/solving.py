@@ -295,8 +295,7 @@ def read_settings(text: str) -> Settings:
     Alternatively, `text` is the path of a file with such lines, in which # begins a comment. The last value
     of a name is used.
     """
-    given: dict[str, Any] = {}
-    remarks: dict[str, Phrase] = {}
+    given, remarks = dict[str, Any](), dict[str, Phrase]()
     for name, value, where in _words(text):
         try:
             if (own := PARAMETERS.get(name)) is not None:

@@ -128,7 +128,7 @@ def _tables(files: Mapping[str, Path], found: _Sources) -> dict[str, Said]:
                 raise said.place.error(phrase("photos.ambiguous", photo=name, names=keys))
             key = keys[0] if keys else (PurePosixPath(folder) / name).as_posix()
             again[path] += given.setdefault(key, said) is not said
-    found.messages += [Message(phrase("photos.other-table", n=n), path) for path, n in again.items() if n]
+    found.messages += [Message.of("photos.other-table", path, n=n) for path, n in again.items() if n]
     return given
 
 
@@ -136,10 +136,9 @@ def _add_exposures(files: Mapping[str, Path], found: _Sources, *, antenna: bool)
     """Add exposures of .MRK files to the photos of their folders, or of subfolders without such files."""
     exposures = {path: read_exposures(path, antenna=antenna) for path in files.values()}
     found.tables += exposures
-    of_folder: dict[str, list[Path]] = {}
+    of_folder, used = dict[str, list[Path]](), {path: set[int]() for path in exposures}
     for key, path in files.items():
         of_folder.setdefault(PurePosixPath(key).parent.as_posix(), []).append(path)
-    used: dict[Path, set[int]] = {path: set() for path in exposures}
     for key, sources in found.said.items():
         photo = PurePosixPath(key)
         number = number_of(photo.stem)
