@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -13,16 +12,10 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.crs import GEOCENTRIC as EARTH
-from photogram.formats.crs import GEOGRAPHIC
+from photogram.formats.crs import GEOGRAPHIC, east_north_up, from_frame
 from photogram.formats.format import FORMATS
 from photogram.formats.images import Y_DOWN, checked_rotation, known_size, lens_with, pixel_rows
-from photogram.formats.models import (
-    KnownPoints,
-    attitude_matrices,
-    chosen_model,
-    known_cameras,
-    known_points,
-)
+from photogram.formats.models import KnownPoints, attitude_matrices, chosen_model, known_cameras, known_points
 from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import Element, read_stream
@@ -38,14 +31,6 @@ LOCAL = "LOCAL_CS"
 GEOCENTRIC = 1e6  # Distance from the origin (m) beyond which a world is geocentric
 _TERMS = ("f", "cx", "cy", "b1", "b2", "k1", "k2", "k3", "k4", "p1", "p2", "p3", "p4")
 _Similarity = tuple[Floats, Floats, float]  # R, T, s of X_world = s R X_chunk + T
-
-
-class _Reference(NamedTuple):
-    """The reference of a camera or marker; standard deviations of 0 or NaN are unknown."""
-
-    xyz: Floats
-    sd: Floats
-    enabled: bool
 
 
 def read(path: Path, options: ReadOptions) -> Project:
@@ -76,13 +61,12 @@ def read(path: Path, options: ReadOptions) -> Project:
         np.broadcast_to(options.sd.get(kind, (settings.get(f"accuracy_{name}", np.nan),)), 3)
         for kind, name in (("gnss", "cameras"), ("control", "markers"))
     )
+    references = {shot.attributes["id"]: (shot, _reference(shot, gnss_sd)) for shot in shots}
     lost = 0
-    for shot in shots if system is not None else ():
-        if (reference := _reference(shot, gnss_sd)) is not None and reference.enabled:
-            if (reference.sd > 0).all():
-                block.gnss(shot.attributes["id"], reference.xyz, reference.sd, shot, crs=system or "")
-            else:
-                lost += 1
+    for key, (shot, (xyz, sd, enabled)) in references.items() if system is not None else ():
+        if enabled and (sd > 0).all():
+            block.gnss(key, xyz, sd, shot, crs=system or "")
+        lost += enabled and not (sd > 0).all()
     if lost:
         block.lacks.append(Phrase("read.references", {"number": lost, "option": option_sd("gnss")}))
     _markers(chunk, block, markers, system, control_sd)
@@ -126,10 +110,8 @@ def _sensor(element: Element, name: str, messages: list[Message]) -> tuple[Camer
         else:
             fx, fy = calibration.number("fx"), calibration.number("fy")
             values |= {"f": fy, "b1": fx - fy, "b2": calibration.number("skew", 0.0)}
-            values |= {
-                "cx": calibration.number("cx") - width / 2,
-                "cy": calibration.number("cy") - height / 2,
-            }
+            values["cx"] = calibration.number("cx") - width / 2
+            values["cy"] = calibration.number("cy") - height / 2
             if values["p1"] or values["p2"]:
                 messages.append(Message(phrase("agisoft.exchanged", camera=name)))
     model, further = f"agisoft_{kind}", [values.pop(term, 0.0) for term in _TERMS[-2:]]
@@ -158,7 +140,6 @@ def _shots(chunk: Element, block: BlockBuilder) -> list[Element]:
 
 
 def _similarity(element: Element | None) -> _Similarity | None:
-    """Return the similarity of a transform; None without a rotation."""
     rotation = None if element is None else element.child("rotation")
     if element is None or rotation is None:
         return None
@@ -176,10 +157,8 @@ def _with_poses(
     Returns the system of references; None if they cannot be transformed.
     """
     whole = _similarity(chunk.child("transform")) or (np.eye(3), np.zeros(3), 1.0)
-    components = {
-        each.attributes.get("id"): _similarity(each.child("transform"))
-        for each in _members(chunk, "components", "component")
-    }
+    parts = _members(chunk, "components", "component")
+    components = {each.attributes.get("id"): _similarity(each.child("transform")) for each in parts}
     centres, matrices = np.empty((len(shots), 3)), np.empty((len(shots), 3, 3))
     for row, each in enumerate(shots):
         transform = each.need("transform")
@@ -189,7 +168,7 @@ def _with_poses(
         matrices[row] = rotation @ turn @ Y_DOWN
         centres[row] = scale * rotation @ values[:3, 3] + translation
     system = chunk.word("reference")
-    given = [own.xyz for each in (*shots, *markers) if (own := _reference(each, np.ones(3))) is not None]
+    given = [own for each in (*shots, *markers) if not np.isnan(own := _reference(each, np.ones(3))[0]).any()]
     # A world is geocentric, judged by its size, its system or the range of its references.
     degrees = np.abs(np.array(given).reshape(-1, 3)[:, :2]) <= (360.0, 90.0)
     far = np.linalg.norm(centres.mean(axis=0)) >= GEOCENTRIC and not system.upper().startswith(LOCAL)
@@ -208,11 +187,11 @@ def _with_poses(
     return None
 
 
-def _reference(element: Element, default: Floats) -> _Reference | None:
-    """Return a reference; None if missing."""
+def _reference(element: Element, default: Floats) -> tuple[Floats, Floats, bool]:
+    """Return position (NaN if missing), standard deviations (0 or NaN if unknown), and whether it is used."""
     own = element.child("reference")
     if own is None or any(axis not in own.attributes for axis in "xyz"):
-        return None
+        return np.full(3, np.nan), default, False
     position = np.array([own.attribute(axis) for axis in "xyz"])
     sd = default.copy()
     # One for all axes, one for both horizontal coordinates, or one for each: the most detailed one is used.
@@ -220,7 +199,7 @@ def _reference(element: Element, default: Floats) -> _Reference | None:
         if name in own.attributes:
             sd[:axes] = own.attribute(name)
     sd = np.array([own.attribute(f"s{axis}", float(sd[k])) for k, axis in enumerate("xyz")])
-    return _Reference(position, sd, own.attributes.get("enabled", "true").lower() not in ("false", "0"))
+    return position, sd, own.attributes.get("enabled", "true").lower() not in ("false", "0")
 
 
 def _markers(
@@ -231,10 +210,9 @@ def _markers(
         key = marker.attributes.get("id", "")
         name = marker.attributes.get("label") or f"marker {row}"
         block.point(key, marker, name=name)
-        reference = _reference(marker, default)
-        if system is None or reference is None:
+        xyz, sd, enabled = _reference(marker, default)
+        if system is None or np.isnan(xyz).any():
             continue
-        xyz, sd, enabled = reference
         if not enabled:
             block.control(key, xyz, np.where(sd > 0, sd, np.nan), marker, crs=system, check=True)
         elif not (sd > 0).all():
@@ -251,9 +229,8 @@ def _markers(
                     block.image(photo, point, each.attribute("x"), each.attribute("y"))
 
 
-LOCAL_SYSTEM = (
-    'LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],UNIT["metre",1,AUTHORITY["EPSG","9001"]]]'
-)
+_METRE = 'UNIT["metre",1,AUTHORITY["EPSG","9001"]]'
+LOCAL_SYSTEM = f'LOCAL_CS["Local Coordinates (m)",LOCAL_DATUM["Local Datum",0],{_METRE}]'
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
@@ -261,12 +238,10 @@ def cannot_hold(project: Project) -> list[Phrase]:
     block, known = project.block, known_points(project)
     marked = np.isin(np.arange(len(block.point_ids)), np.array(known.rows, dtype=int)[_complete(known)])
     partial = np.isfinite(block.point_positions).any(axis=1) & ~marked
-    counts = {
-        "lost.ties": np.count_nonzero(~marked[block.image_points]),
-        "lost.partial-control": np.count_nonzero(partial),
-        "lost.geocentric-digits": np.count_nonzero(project.frame.kind in ("topocentric", "geocentric")),
-    }
-    return [phrase(code, n=int(count)) for code, count in counts.items() if count]
+    ties, parts = (int(np.count_nonzero(own)) for own in (~marked[block.image_points], partial))
+    far = int(project.frame.kind in ("topocentric", "geocentric"))
+    counts = {"lost.ties": ties, "lost.partial-control": parts, "lost.geocentric-digits": far}
+    return [phrase(code, n=count) for code, count in counts.items() if count]
 
 
 def write(project: Project) -> Mapping[str, bytes]:
@@ -274,8 +249,11 @@ def write(project: Project) -> Mapping[str, bytes]:
     block = project.block
     if not known_poses(block).any():
         raise InputError(phrase("format.poses"))
-    world = _world(project.frame)
-    system = (world.crs or LOCAL_SYSTEM).replace('"', "&quot;")
+    frame, rotation, translation = project.frame, np.eye(3), np.zeros(3)
+    if frame.origin is not None and frame.kind == "topocentric":
+        rotation = east_north_up(frame.origin).T
+        translation = from_frame(EARTH, np.zeros((1, 3)), np.zeros((1, 3, 3)), frame)[0][0]
+    system = (GEOGRAPHIC if _is_placed(frame) else LOCAL_SYSTEM).replace('"', "&quot;")
     cameras, which = known_cameras(block)
     sensors = enumerate(zip(cameras, project.sizes, project.pixel_mm, strict=True))
     lines = [
@@ -287,12 +265,12 @@ def write(project: Project) -> Mapping[str, bytes]:
         "</sensors>",
         '<components next_id="1" active_id="0">',
         '<component id="0" label="Component 1">',
-        f"<transform><rotation>{_numbers(world.rotation)}</rotation>"
-        f"<translation>{_numbers(world.translation)}</translation><scale>1.0</scale></transform>",
+        f"<transform><rotation>{_numbers(rotation)}</rotation>"
+        f"<translation>{_numbers(translation)}</translation><scale>1.0</scale></transform>",
         "</component>",
         "</components>",
-        *_written_shots(project, world, which),
-        *_written_markers(project, world),
+        *_written_shots(project, which),
+        *_written_markers(project),
         f"<reference>{system}</reference>",
         "</chunk>",
         "</document>",
@@ -301,33 +279,14 @@ def write(project: Project) -> Mapping[str, bytes]:
     return {FORMATS["agisoft"].files[0]: "\n".join(lines).encode()}
 
 
-class _World(NamedTuple):
-    """The transformation X_world = R X + T of the chunk, and the system of references; empty: local."""
-
-    rotation: Floats
-    translation: Floats
-    crs: str
-    frame: Frame
-
-    def references(self, xyz: Floats, covariances: Floats) -> tuple[Floats, Floats]:
-        """Return positions and standard deviations in the reference system."""
-        if self.crs and len(xyz):
-            from photogram.formats.crs import from_frame
-
-            xyz, covariances = from_frame(self.crs, xyz, covariances, self.frame)
-        return xyz, np.sqrt(np.einsum("nii->ni", covariances))
+def _is_placed(frame: Frame) -> bool:
+    return frame.kind == "geocentric" or (frame.kind == "topocentric" and frame.origin is not None)
 
 
-def _world(frame: Frame) -> _World:
-    if frame.kind == "cartesian" or (frame.kind == "topocentric" and frame.origin is None):
-        return _World(np.eye(3), np.zeros(3), "", frame)
-    from photogram.formats.crs import east_north_up, from_frame
-
-    rotation, translation = np.eye(3), np.zeros(3)
-    if frame.origin is not None and frame.kind == "topocentric":
-        rotation = east_north_up(frame.origin).T
-        translation = from_frame(EARTH, np.zeros((1, 3)), np.zeros((1, 3, 3)), frame)[0][0]
-    return _World(rotation, translation, GEOGRAPHIC, frame)
+def _references(frame: Frame, xyz: Floats, covariances: Floats) -> tuple[Floats, Floats]:
+    if _is_placed(frame) and len(xyz):
+        xyz, covariances = from_frame(GEOGRAPHIC, xyz, covariances, frame)
+    return xyz, np.sqrt(np.einsum("nii->ni", covariances))
 
 
 def _numbers(values: Floats) -> str:
@@ -363,20 +322,16 @@ def _calibration(camera: Camera, size: Size | None) -> tuple[str, Mapping[str, f
     return "frame", values | terms | {"p1": terms["p2"], "p2": terms["p1"]}
 
 
-def _written_shots(project: Project, world: _World, which: list[int]) -> list[str]:
+def _written_shots(project: Project, which: list[int]) -> list[str]:
     block = project.block
     turns = attitude_matrices(block) @ Y_DOWN
     given = block.observations.of_type(Position)
-    positions, sd = world.references(
-        np.array([each.observed[:3] for each in given]).reshape(-1, 3),
-        np.array([each.precision for each in given]).reshape(-1, 3, 3),
-    )
-    references = {
-        each.photo: _written_reference(position, deviation)
-        for each, position, deviation in zip(given, positions, sd, strict=True)
-    }
+    observed = np.array([each.observed[:3] for each in given]).reshape(-1, 3)
+    precisions = np.array([each.precision for each in given]).reshape(-1, 3, 3)
+    written = map(_written_reference, *_references(project.frame, observed, precisions))
+    references = dict(zip((each.photo for each in given), written, strict=True))
     lines = [f'<cameras next_id="{len(block.photo_ids)}" next_group_id="0">']
-    for row in np.flatnonzero(known_poses(project.block)).tolist():
+    for row in np.flatnonzero(known_poses(block)).tolist():
         name = block.photo_ids[row]
         transform = np.eye(4)
         transform[:3, :3], transform[:3, 3] = turns[row], block.photo_positions[row]
@@ -405,12 +360,12 @@ def _complete(known: KnownPoints) -> Bools:
     return np.asarray(np.isfinite(known.positions).all(axis=1) & held)
 
 
-def _written_markers(project: Project, world: _World) -> list[str]:
+def _written_markers(project: Project) -> list[str]:
     known = known_points(project)
     own = np.flatnonzero(_complete(known)).tolist()
     if not own:
         return []
-    positions, deviations = world.references(known.positions[own], known.covariances[own])
+    positions, deviations = _references(project.frame, known.positions[own], known.covariances[own])
     lines = [f'<markers next_id="{len(own)}" next_group_id="0">']
     for k, (row, sd) in enumerate(zip(own, deviations, strict=True)):
         name = quoteattr(project.block.point_ids[known.rows[row]])

@@ -19,7 +19,7 @@ import numpy as np
 
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.cards import Card, cards, one_file
+from photogram.formats.cards import Card, cards, file_of, one_file
 from photogram.formats.format import FORMATS
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
@@ -39,16 +39,13 @@ class _Reader(BlockBuilder):
 
     def __init__(self, path: Path, control_sd: tuple[float, ...] | None) -> None:
         super().__init__(path, FORMATS["aicon"].title)
-        self.control_sd = control_sd
-        self.inactive: dict[str, set[str]] = {"photos": set(), "points": set()}
+        self.control_sd, self.inactive = control_sd, {"photos": set[str](), "points": set[str]()}
 
 
 def read(path: Path, options: ReadOptions) -> Project:
     """Read photo coordinates and the other files; cameras are required."""
-    folder = path if path.is_dir() else path.parent
-    images = one_file(folder, IMAGES) if path.is_dir() else path
-    if images is None:
-        raise InputError(phrase("format.files", name=f"*{IMAGES}"), file=folder)
+    images = file_of(path, IMAGES)
+    folder = images.parent
     files = {
         suffix: each if (each := images.with_suffix(suffix)).is_file() else one_file(folder, suffix)
         for suffix in (CAMERAS, POSES, POINTS, BARS)
@@ -62,10 +59,9 @@ def read(path: Path, options: ReadOptions) -> Project:
             take(file, block)
     for kind, names in block.inactive.items():
         if names:
-            block.messages.append(Message(phrase("aicon.inactive", n=len(names), what=kind)))
-    photos, points, xy = block.image_rows()
+            block.messages.append(Message.of("aicon.inactive", n=len(names), what=kind))
     sd = np.array(block.image_sd)
-    block.images(photos, points, xy, sd if (sd > 0).all() else None)
+    block.images(*block.image_rows(), sd if (sd > 0).all() else None)
     if not block.controls:
         block.lacks.append(Phrase("read.free", {"option": Phrase("option.datum")}))
     return block.project(linear_unit="mm")

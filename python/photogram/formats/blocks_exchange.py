@@ -13,6 +13,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
+from photogram.formats.crs import enu_origin
 from photogram.formats.description import agreement
 from photogram.formats.format import FORMATS
 from photogram.formats.images import Y_DOWN, checked_rotation, lens_with, pixel_rows, sizes_of
@@ -51,16 +52,15 @@ BETTER, NOTICED = 3.0, 0.1
 """Ratio of agreement for another definition that rejects a file, and the smallest median for it."""
 
 
-class _Reader:
-    """The contents of a file in the order of reading."""
+class _Reader(BlockBuilder):
+    """A block, with the contents of a file in the order of reading."""
 
     def __init__(self, path: Path, options: ReadOptions) -> None:
-        self.block, self.options = BlockBuilder(path, FORMATS["blocks_exchange"].title), options
-        self.systems: dict[str, str] = {}
+        super().__init__(path, FORMATS["blocks_exchange"].title)
+        self.given_sd, self.systems = options.sd, dict[str, str]()
         self.axes: list[Floats] = []  # Of each camera
         self.positions = 0  # Number of observed positions
-        self.names: set[str] = set()  # Of points
-        self.images: list[tuple[int, int, float, float, bool]] = []
+        self.measured: list[tuple[int, int, float, float, bool]] = []
         """Photo id, point, x, y, and whether these are millimetres from the principal point."""
         self.in_millimetres: Element | None = None  # The first observation in millimetres
 
@@ -78,7 +78,7 @@ def read(path: Path, options: ReadOptions) -> Project:
     block = root.child("Block")
     if len(list(root.all("Block"))) > 1:
         raise root.error(phrase("blocks-exchange.blocks"))
-    if block is None or not found.block.photo_ids:
+    if block is None or not found.photo_ids:
         raise root.error(phrase("format.missing", what="a block with photos"))
     return _checked(_project(found, block.word("SRSId")))
 
@@ -90,26 +90,18 @@ def _group(found: _Reader, element: Element) -> None:
     orientation = element.word("CameraOrientation", "XRightYDown")
     one_word(element, "CameraOrientation", orientation, ORIENTATIONS)
     axes = np.array(ORIENTATIONS[orientation], dtype=float)
-    pixel = _pixel(element, size)
+    pixel: float | None = None
+    for tag, count in (("PixelSize", 1), ("SensorSize", max(size))):
+        if pixel is None and element.child(tag) is not None:
+            pixel = positive(element, "the size of the sensor", element.number(tag) / count)
     name = f"{element.word('Name') or 'camera'} {len(found.axes) + 1}"
     with at_place(element):
         camera = _camera(element, size, axes, pixel, name)
-    found.block.camera(camera, size, pixel, key=len(found.axes))
+    found.camera(camera, size, pixel, key=len(found.axes))
     found.axes.append(axes)
     srs = element.word("SRSId")
     for photo in element.all("Photo"):
         _photo(found, photo, srs)
-
-
-def _pixel(element: Element, size: Size) -> float | None:
-    """Return the side of a pixel in millimetres."""
-    if element.child("PixelSize") is not None:
-        pixel = element.number("PixelSize")
-    elif element.child("SensorSize") is not None:
-        pixel = element.number("SensorSize") / max(size)
-    else:
-        return None
-    return positive(element, "the size of the sensor", pixel)
 
 
 def _camera(element: Element, size: Size, axes: Floats, pixel: float | None, name: str) -> Camera:
@@ -128,7 +120,12 @@ def _camera(element: Element, size: Size, axes: Floats, pixel: float | None, nam
         cx, cy = cx + right, cy - up
     elif point is not None:
         cx, cy = point.number("x") + CENTER, point.number("y") + CENTER
-    terms = _terms(element)
+    terms, distortion = dict.fromkeys(_TERMS, 0.0), element.child("Distortion")
+    for each in () if distortion is None else distortion.children:
+        if each.name in _TERMS:
+            terms[each.name] = each.value
+        elif each.text.strip() not in ("", "0", "0.0", "false"):
+            one_word(each, "term of the distortion", each.name, _TERMS)
     fy, skew = f * element.number("AspectRatio", 1.0), element.number("Skew", 0.0)
     if skew:
         offsets = {"cx": cx - size[0] / 2, "cy": cy - size[1] / 2, "w": float(size[0]), "h": float(size[1])}
@@ -138,24 +135,11 @@ def _camera(element: Element, size: Size, axes: Floats, pixel: float | None, nam
     return Camera("full_opencv", {"fx": f, "fy": fy, "cx": float(cx), "cy": float(cy), **own}, name=name)
 
 
-def _terms(element: Element) -> dict[str, float]:
-    found = dict.fromkeys(_TERMS, 0.0)
-    distortion = element.child("Distortion")
-    if distortion is None:
-        return found
-    for each in distortion.children:
-        if each.name in _TERMS:
-            found[each.name] = each.value
-        elif each.text.strip() not in ("", "0", "0.0", "false"):
-            one_word(each, "term of the distortion", each.name, _TERMS)
-    return found
-
-
 def _photo(found: _Reader, element: Element, srs: str) -> None:
     number, path, pose = element.whole("Id"), element.word("ImagePath"), element.child("Pose")
     if not path:
         raise element.error(phrase("format.member", name="ImagePath"))
-    found.block.photo(number, len(found.axes) - 1, element, name=path)
+    found.photo(number, len(found.axes) - 1, element, name=path)
     if pose is None:
         return
     centre, rotation = np.full(3, np.nan), np.full((3, 3), np.nan)
@@ -163,12 +147,12 @@ def _photo(found: _Reader, element: Element, srs: str) -> None:
         centre, srs = _position(own), own.word("SRSId") or srs
     if (turn := pose.child("Rotation")) is not None:
         rotation = found.axes[-1].T @ _rotation(turn)
-    found.block.pose(number, centre, rotation.T, crs=srs)
+    found.pose(number, centre, rotation.T, crs=srs)
     metadata = pose.child("Metadata")
     if metadata is not None and (own := metadata.child("Center")) is not None:
         position, found.positions = _position(own), found.positions + 1
-        if (sd := found.options.sd.get("gnss")) is not None:
-            found.block.gnss(number, position, sd, crs=metadata.word("SRSId") or srs)
+        if (sd := found.given_sd.get("gnss")) is not None:
+            found.gnss(number, position, sd, crs=metadata.word("SRSId") or srs)
 
 
 def _position(element: Element) -> Floats:
@@ -178,8 +162,8 @@ def _position(element: Element) -> Floats:
 def _rotation(element: Element) -> Floats:
     """Return (3, 3) world to camera, in the axes of the camera orientation."""
     if element.child("M_00") is not None:
-        matrix = np.array([[element.number(f"M_{i}{j}") for j in range(3)] for i in range(3)])
-        return checked_rotation(element, matrix)
+        matrix = [[element.number(f"M_{i}{j}") for j in range(3)] for i in range(3)]
+        return checked_rotation(element, np.array(matrix))
     if element.child("Omega") is not None:
         angles = np.radians([[element.number(name) for name in ("Omega", "Phi", "Kappa")]])
         if (most := np.abs(angles).max()) > 1e4:
@@ -189,7 +173,7 @@ def _rotation(element: Element) -> Floats:
 
 
 def _control(found: _Reader, element: Element) -> None:
-    key = len(found.block.point_ids)
+    key = len(found.point_ids)
     name = element.word("Name") or f"control {key + 1}"
     category = element.word("Category", "Full")
     one_word(element, "Category", category, ("Full", "Horizontal", "Vertical"))
@@ -199,49 +183,45 @@ def _control(found: _Reader, element: Element) -> None:
         position[2] = np.nan
     elif category == "Vertical":
         position[:2] = np.nan
-    default = np.broadcast_to(found.options.sd.get("control", (np.nan,)), 3)
+    default = np.broadcast_to(found.given_sd.get("control", (np.nan,)), 3)
     horizontal = element.number("HorizontalAccuracy", float(default[0]))
     sd = np.array([horizontal, horizontal, element.number("VerticalAccuracy", float(default[2]))])
     check = element.word("CheckPoint").lower() in ("true", "1")
     if not check and not (sd[~np.isnan(position)] > 0).all():
         raise element.error(phrase("format.sd", name=name, option=option_sd("control")))
-    found.names.add(name)
-    found.block.point(key, element, name=name)
-    found.block.control(key, position, sd, element, crs=element.word("SRSId"), check=check)
+    found.point(key, element, name=name)
+    found.control(key, position, sd, element, crs=element.word("SRSId"), check=check)
     _measurements(found, element)
 
 
 def _tie(found: _Reader, element: Element) -> None:
-    key, given = len(found.block.point_ids), element.child("Position")
+    key, given = len(found.point_ids), element.child("Position")
     position = np.full(3, np.nan) if given is None else _position(given)
     name = element.word("Name") or f"tie {key + 1}"
-    while name in found.names:  # Control points may have the name of a tie point
+    while name in found.point_names:  # Control points may have the name of a tie point
         name += "'"
-    found.names.add(name)
-    found.block.point(key, element, name=name)
+    found.point(key, element, name=name)
     if np.isfinite(position).all():
-        found.block.start(key, position, element, crs=element.word("SRSId"))
+        found.start(key, position, element, crs=element.word("SRSId"))
     _measurements(found, element)
 
 
 def _measurements(found: _Reader, element: Element) -> None:
-    point = len(found.block.point_ids) - 1
+    point = len(found.point_ids) - 1
     for each in element.all("Measurement"):
         millimetres = each.child("xmm") is not None
         across, down = ("xmm", "ymm") if millimetres else ("x", "y")
         xy = each.number(across), each.number(down)
-        found.images.append((each.whole("PhotoId"), point, *xy, millimetres))
+        found.measured.append((each.whole("PhotoId"), point, *xy, millimetres))
         if millimetres and found.in_millimetres is None:
             found.in_millimetres = each
 
 
-def _project(found: _Reader, srs: str) -> Project:
-    block = found.block
-
+def _project(block: _Reader, srs: str) -> Project:
     @cache
     def system(own: str) -> str:
         """Return the definition of a system for PROJ; empty if it is local."""
-        text = found.systems.get(own or srs, "").strip()
+        text = block.systems.get(own or srs, "").strip()
         return "" if text.upper().startswith("LOCAL_CS") else text
 
     names = [path.replace("\\", "/").rsplit("/", 1)[-1] for path in block.photo_ids]
@@ -250,31 +230,26 @@ def _project(found: _Reader, srs: str) -> Project:
     first = next((crs for _, _, crs in block.poses.values()), "")
     block.define_systems(system)
     if main := system(srs or first):
-        from photogram.formats.crs import enu_origin
-
         if (origin := enu_origin(main)) is None:
             block.frame_amid(main)
         else:
             block.frame, block.crs = Frame("topocentric", "EPSG:4979", origin), main
-    if found.positions and "gnss" not in found.options.sd:
-        block.lacks.append(Phrase("read.gnss", {"number": found.positions, "option": option_sd("gnss")}))
-    images = [each for each in found.images if each[0] in block.photo_rows]
-    if lost := len(found.images) - len(images):
-        block.messages.append(Message(phrase("format.unknown-images", n=lost)))
+    if block.positions and "gnss" not in block.given_sd:
+        block.lacks.append(Phrase("read.gnss", {"number": block.positions, "option": option_sd("gnss")}))
+    images = [each for each in block.measured if each[0] in block.photo_rows]
+    if lost := len(block.measured) - len(images):
+        block.messages.append(Message.of("format.unknown-images", n=lost))
     photos = np.array([block.photo_rows[each[0]] for each in images], dtype=np.int64)
     points = np.array([each[1] for each in images], dtype=np.int64)
-    block.images(photos, points, _corner(found, images, np.array(block.photo_cameras)[photos]))
+    block.images(photos, points, _corner(block, images, np.array(block.photo_cameras)[photos]))
     return block.project()
 
 
 def _corner(found: _Reader, images: list[tuple[int, int, float, float, bool]], groups: Any) -> Floats:
-    """Return (m, 2) columns and rows from the corner."""
     xy = np.array([each[2:4] for each in images], dtype=float).reshape(-1, 2)
     millimetres = np.array([each[4] for each in images], dtype=bool)
     corner = xy + CENTER
-    for row, (camera, axes, pixel) in enumerate(
-        zip(found.block.cameras, found.axes, found.block.pixel_mm, strict=True)
-    ):
+    for row, (camera, axes, pixel) in enumerate(zip(found.cameras, found.axes, found.pixel_mm, strict=True)):
         own = millimetres & (groups == row)
         if not own.any():
             continue
@@ -296,16 +271,13 @@ def _checked(project: Project) -> Project:
     if not as_read > NOTICED:
         return project
     for name, change in _READINGS.items():
-        cameras = [
-            each.replace(parameters={**each.parameters, **change(each.parameters)})
-            for each in project.block.cameras
-        ]
+        values = [{**each.parameters, **change(each.parameters)} for each in project.block.cameras]
+        pairs = zip(project.block.cameras, values, strict=True)
+        cameras = [camera.replace(parameters=own) for camera, own in pairs]
         other = agreement(project.replace(block=project.block.replace(cameras=cameras))).median
         if other * BETTER < as_read:
-            raise InputError(
-                phrase("blocks-exchange.distortion", as_read=as_read, other=other, reading=name),
-                file=project.path,
-            )
+            fields = {"as_read": as_read, "other": other, "reading": name}
+            raise InputError(phrase("blocks-exchange.distortion", **fields), file=project.path)
     return project
 
 
@@ -320,17 +292,11 @@ def write(project: Project) -> Mapping[str, bytes]:
     """Return the file."""
     block = project.block
     cameras, which = known_cameras(block)
-    frame = project.frame
-    definition = (
-        "ENU:{!r},{!r},{!r}".format(*frame.origin)
-        if frame.kind == "topocentric" and frame.origin is not None
-        else 'LOCAL_CS["Local",UNIT["metre",1]]'
-    )
-    lines = [
-        '<?xml version="1.0" encoding="utf-8"?>',
-        '<BlocksExchange version="2.1">',
-        "<SpatialReferenceSystems>",
-    ]
+    definition = 'LOCAL_CS["Local",UNIT["metre",1]]'
+    if project.frame.kind == "topocentric" and project.frame.origin is not None:
+        definition = "ENU:{!r},{!r},{!r}".format(*project.frame.origin)
+    lines = ['<?xml version="1.0" encoding="utf-8"?>', '<BlocksExchange version="2.1">']
+    lines.append("<SpatialReferenceSystems>")
     lines += [f"<SRS><Id>0</Id><Name>frame</Name><Definition>{escape(definition)}</Definition></SRS>"]
     lines += ["</SpatialReferenceSystems>", "<Block>", f"<Name>{_text(block.title or 'block')}</Name>"]
     lines += ["<Type>Aerial</Type>", "<SRSId>0</SRSId>", "<Photogroups>"]
@@ -383,13 +349,8 @@ def _written_photo(
         pose += f"<Center>{_xyz(centre)}<Accurate>true</Accurate></Center>"
     if name in gnss:
         pose += f"<Metadata><SRSId>0</SRSId><Center>{_xyz(gnss[name])}</Center></Metadata>"
-    return [
-        "<Photo>",
-        f"<Id>{photo}</Id>",
-        f"<ImagePath>{escape(name)}</ImagePath>",
-        *([f"<Pose>{pose}</Pose>"] if pose else []),
-        "</Photo>",
-    ]
+    poses = [f"<Pose>{pose}</Pose>"] if pose else []
+    return ["<Photo>", f"<Id>{photo}</Id>", f"<ImagePath>{escape(name)}</ImagePath>", *poses, "</Photo>"]
 
 
 def _points(project: Project) -> list[str]:

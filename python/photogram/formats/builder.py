@@ -14,6 +14,7 @@ from photogram.adjustment.options import AdjustOptions
 from photogram.arguments.arrays import is_covariance, repeated_pairs
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.formats.crs import amid, to_frame, turn_to_frame
 from photogram.formats.project import Project, Repeated, Size
 from photogram.io.places import Failing, Place, at_place
 from photogram.lazy_dataclasses import dataclass, field
@@ -86,7 +87,7 @@ class BlockBuilder:
         self.camera_rows: dict[Hashable, int] = {}
         self.photo_rows: dict[Hashable, int] = {}
         self.point_rows: dict[Hashable, int] = {}
-        self._photo_names, self._point_names = set[str](), set[str]()
+        self.photo_names, self.point_names = set[str](), set[str]()
         self.poses: dict[Hashable, tuple[Floats, Floats, str]] = {}
         self.remarks_on_systems = True  # Whether assumptions on heights of systems are reported
         self.crs: str | None = ""  # System of the coordinates of the frame; None: another
@@ -121,7 +122,7 @@ class BlockBuilder:
     ) -> None:
         """Add a photo of a camera."""
         place, name = place or self.place, str(key) if name is None else name
-        _check_name("photo", name, self._photo_names, place)
+        _check_name("photo", name, self.photo_names, place)
         if camera not in self.camera_rows:
             raise place.error(phrase("format.undefined", what="camera", name=str(camera)))
         _add(self.photo_rows, key, "photo", place)
@@ -174,15 +175,11 @@ class BlockBuilder:
                 self.photo_ids.append(name)
                 self.photo_cameras.append(owners.get(reference, self.photo_cameras[row]))
                 stands.append((centres[row] - matrix @ sensor.position, matrix))
-            self.mounts += [
-                Mount(self.photo_ids[row], name, frame.rig.sensors[camera])
-                for camera, row in frame.photos.items()
-                if camera != reference
-            ]
-        self._poses = (
-            np.vstack([centres, *(centre for centre, _ in stands)]),
-            np.concatenate([matrices, *(matrix[np.newaxis] for _, matrix in stands)]),
-        )
+            for camera, row in frame.photos.items():
+                if camera != reference:
+                    self.mounts.append(Mount(self.photo_ids[row], name, frame.rig.sensors[camera]))
+        centres = np.vstack([centres, *(centre for centre, _ in stands)])
+        self._poses = centres, np.concatenate([matrices, *(matrix[np.newaxis] for _, matrix in stands)])
         free = np.full((len(stands), 3), np.inf)
         if np.ndim(self.position_sd):
             self.position_sd = np.vstack([self.position_sd, free])
@@ -192,7 +189,7 @@ class BlockBuilder:
     def point(self, key: Hashable, place: Failing | None = None, *, name: str | None = None) -> None:
         """Add a point."""
         place, name = place or self.place, str(key) if name is None else name
-        _check_name("point", name, self._point_names, place)
+        _check_name("point", name, self.point_names, place)
         _add(self.point_rows, key, "point", place)
         self.point_ids.append(name)
 
@@ -242,7 +239,6 @@ class BlockBuilder:
         *,
         sd: ArrayLike = np.nan,
     ) -> None:
-        """Add an image observation of a photo that was added before."""
         if photo not in self.photo_rows:
             raise (place or self.place).error(phrase("format.undefined", what="photo", name=str(photo)))
         if point not in self.point_rows:
@@ -263,7 +259,6 @@ class BlockBuilder:
 
     @property
     def controls(self) -> int:
-        """Number of control points that were added one by one."""
         return len(self._control)
 
     def define_systems(self, system: Callable[[str], str]) -> None:
@@ -274,9 +269,6 @@ class BlockBuilder:
                 located[key] = each._replace(crs=system(each.crs))
 
     def frame_amid(self, crs: str) -> None:
-        """Set a topocentric frame amid the photos with positions in a system."""
-        from photogram.formats.crs import amid
-
         centres = np.array([centre for centre, _, own in self.poses.values() if own == crs]).reshape(-1, 3)
         known = centres[np.isfinite(centres).all(axis=1)]
         if not len(known):
@@ -285,11 +277,7 @@ class BlockBuilder:
         self.messages.append(Message(phrase("format.frame", crs=crs, frame=self.frame.phrase)))
 
     def project(
-        self,
-        *,
-        options: AdjustOptions | None = None,
-        details: Mapping[str, Any] | None = None,
-        **fields: Any,
+        self, *, options: AdjustOptions | None = None, details: Mapping[str, Any] | None = None, **fields: Any
     ) -> Project:
         """Return the project; `fields` are other fields of the block.
 
@@ -340,7 +328,6 @@ class BlockBuilder:
         )
 
     def _photo_poses(self) -> tuple[Floats, Floats]:
-        """Return (P, 3) centres and (P, 3, 3) rotations in the frame."""
         if self._poses is not None:
             return self._poses
         count, systems = len(self.photo_ids), dict[str, list[int]]()
@@ -354,21 +341,15 @@ class BlockBuilder:
             if own and crs != self.crs:
                 given = centres[own]
                 centres[own], _ = self._in_frame(crs, given, np.zeros((len(own), 3, 3)))
-                from photogram.formats.crs import turn_to_frame
-
                 matrices[own] = turn_to_frame(crs, given, self.frame) @ matrices[own]
         return centres, matrices
 
     def _in_frame(self, crs: str, xyz: Floats, covariances: Floats) -> tuple[Floats, Floats]:
-        """Return positions and covariances of a system in the frame."""
         if crs == self.crs:
             return xyz, covariances
         if not crs or self.crs == "":
-            raise self.place.error(
-                phrase("blocks-exchange.systems", crs=crs or "local", frame=str(self.frame))
-            )
-        from photogram.formats.crs import to_frame
-
+            fields = {"crs": crs or "local", "frame": str(self.frame)}
+            raise self.place.error(phrase("blocks-exchange.systems", **fields))
         xyz, covariances, remarks = to_frame(crs, xyz, covariances, self.frame)
         known = {message.phrase for message in self.messages}
         if self.remarks_on_systems:
@@ -388,7 +369,6 @@ class BlockBuilder:
             yield from zip(own, own.values(), xyz, covariances, strict=True)
 
     def _point_fields(self) -> tuple[Floats, dict[str, Any]]:
-        """Return initial positions, and the fields of the block for points."""
         for key in (*self._control, *self._checks):
             if key not in self.point_rows:
                 self.point(key)
@@ -432,10 +412,9 @@ class BlockBuilder:
                     found += self._located({photo: each})
                 except InputError:
                     lost.append(names[photo])
-        self.observations += [
-            Position(names[photo], xyz, covariance=(covariance + covariance.T) / 2)
-            for photo, _, xyz, covariance in found
-        ]
+        for photo, _, xyz, covariance in found:
+            position = Position(names[photo], xyz, covariance=(covariance + covariance.T) / 2)
+            self.observations.append(position)
         if lost:
             self.messages.append(Message(phrase("blocks-exchange.gnss", n=len(lost), names=lost)))
 
@@ -443,18 +422,15 @@ class BlockBuilder:
         """Return the fields of the block for images, and repeated observations, which are omitted."""
         photos, points, xy, sd = (*self.image_rows(), None) if self._images is None else self._images
         left = repeated_pairs(photos, points, len(self.point_ids))
-        repeated = Repeated(
-            tuple(self.photo_ids[row] for row in photos[left].tolist()),
-            tuple(self.point_ids[row] for row in points[left].tolist()),
-            np.asarray(xy)[left],
-        )
+        photo_names = tuple(self.photo_ids[row] for row in photos[left].tolist())
+        point_names = tuple(self.point_ids[row] for row in points[left].tolist())
+        repeated = Repeated(photo_names, point_names, np.asarray(xy)[left])
         if len(left):
             photos, points = np.delete(photos, left), np.delete(points, left)
             xy = np.delete(xy, left, axis=0)
             if sd is not None and np.ndim(sd):
                 sd = np.delete(sd, left, axis=0)
-            pairs = zip(repeated.points, repeated.photos, strict=True)
-            names = [f"{point} on {photo}" for point, photo in pairs]
+            names = [f"{point} on {photo}" for point, photo in zip(point_names, photo_names, strict=True)]
             remark = Message.of("read.repeated", n=len(left), names=names, option=Phrase("option.repeated"))
             self.messages.append(remark)
         if sd is None:
@@ -470,7 +446,6 @@ class BlockBuilder:
 
 
 def _add(rows: dict[Hashable, int], key: Hashable, what: str, place: Failing) -> None:
-    """Add a key of an object with its row."""
     if key in rows:
         raise place.error(phrase("format.repeated", what=what, name=str(key)))
     rows[key] = len(rows)

@@ -17,8 +17,6 @@ END = "-99"  # Word that ends a photo or a file
 
 
 class Card:
-    """The words and the location of a line."""
-
     def __init__(self, place: Place) -> None:
         self.place = place
         self.words = (place.text or "").split()
@@ -59,7 +57,13 @@ def one_file(path: Path, suffix: str) -> Path | None:
     """Return the only file of a suffix in a folder, in any case; None without."""
     found = [each for each in sorted(path.iterdir()) if each.suffix.lower() == suffix and each.is_file()]
     if len(found) > 1:
-        raise InputError(
-            phrase("format.several", name=suffix, names=[file.name for file in found]), file=path
-        )
+        names = [file.name for file in found]
+        raise InputError(phrase("format.several", name=suffix, names=names), file=path)
     return found[0] if found else None
+
+
+def file_of(path: Path, suffix: str) -> Path:
+    """Return a file, or the only file of a suffix in a folder."""
+    if (found := one_file(path, suffix) if path.is_dir() else path) is None:
+        raise InputError(phrase("format.files", name=f"*{suffix}"), file=path)
+    return found

@@ -20,7 +20,6 @@ ROLE = "use"  # Column of the roles: control or check
 
 
 def _declared() -> dict[str, dict[str, str]]:
-    """Return the meaning of each word by the kind of its row."""
     found: dict[str, dict[str, str]] = {}
     for kind, meaning, _, words in declared(__file__, "headings.csv"):
         for word in words.split(", "):
@@ -30,8 +29,6 @@ def _declared() -> dict[str, dict[str, str]]:
 
 WORDS = _declared()  # Meanings of words by kind
 _KNOWN, _KNOWN_ROLES, _TOGETHER = (WORDS[kind] for kind in ("column", "role", "accuracy"))
-PHOTO_WORDS = WORDS["photo"].keys()  # Headings of the column of photos
-PIXEL_WORDS = WORDS["pixel"]  # Headings of image coordinates, in columns and rows
 _METRES: Mapping[float, str] = {
     1.0: "m, meter, metre, meters, metres",
     1000.0: "km",
@@ -114,6 +111,10 @@ def column_of(heading: str) -> str | None:
                 if own in ("x", "y", "z"):
                     return f"sd_{own}"
     return _meaning(words)
+
+
+def is_photo(heading: str) -> bool:
+    return " ".join(words_of(heading)) in WORDS["photo"]
 
 
 def is_angular(heading: str) -> bool:

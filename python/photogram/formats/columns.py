@@ -13,13 +13,13 @@ from photogram.errors import InputError
 from photogram.formats.column_words import (
     ANGULAR,
     KINDS_OF_UNITS,
-    PHOTO_WORDS,
-    PIXEL_WORDS,
     ROLE,
+    WORDS,
     bare_name,
     column_of,
     coverage_of,
     is_angular,
+    is_photo,
     role_of,
     units_of,
     words_of,
@@ -27,7 +27,7 @@ from photogram.formats.column_words import (
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.io.delimited import NAMELESS
 from photogram.io.numbers import finite_number, scaled
-from photogram.io.places import one_word
+from photogram.io.places import Place, one_word
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.words import Phrase, phrase, quoted
@@ -55,8 +55,10 @@ _DMS = re.compile(
 )
 
 
-def degrees(text: str) -> float:
-    """Return degrees from spellings such as `47 22 12.3` or `8°32'24.5" W`."""
+def degrees(text: str, other: str = "") -> float:
+    """Return degrees from spellings such as `47 22 12.3` or `8°32'24.5" W`; reject `other` letters."""
+    if any(letter in text for letter in other):
+        raise ValueError(f"{quoted(text)} must not have a letter of the other axis")
     match = _DMS.fullmatch(text.strip())
     before, sign, *parts, behind = match.groups() if match else ("", "", "", "")
     values = [float(part.replace(",", ".")) for part in parts if part]
@@ -71,8 +73,6 @@ def degrees(text: str) -> float:
 
 @dataclass(frozen=True)
 class Columns:
-    """User-defined meaning of the columns of a table."""
-
     # Heading of each internal column; a leading `-` reverses the sign, a trailing `[ft]` is the unit
     headings: Mapping[str, str] = field(default_factory=dict)
     # Internal columns in the order of a table without header; `-` is not read
@@ -84,12 +84,9 @@ class Columns:
     def spelled(self, known: Collection[str], own: Sequence[str]) -> list[str]:
         """Return the internal names of all columns from the headings of a file."""
         names = [""] * len(own)
-        for column, heading in self.headings.items():
+        for column, heading in (*self.headings.items(), *((each, each) for each in self.ignored)):
             for place in _places(heading, own):
                 names[place] = column
-        for heading in self.ignored:
-            for place in _places(heading, own):
-                names[place] = heading
         taken = {*names, *(each for each in own if each in known)}
         # A heading of photos has precedence over one that names anything.
         for k in sorted(range(len(own)), key=lambda k: not is_photo(own[k])):
@@ -105,10 +102,9 @@ class Columns:
             if "photo" in known and (is_photo(heading) or (column == "point" and "point" not in known)):
                 column = "photo"
             elif column not in known:
-                column = PIXEL_WORDS.get(" ".join(words_of(heading)), column)
-            fits = (column in known and (column != ROLE or "cov_xz" in known)) or (
-                column == "sd_xy" and "sd_x" in known
-            )
+                column = WORDS["pixel"].get(" ".join(words_of(heading)), column)
+            fits = column in known and (column != ROLE or "cov_xz" in known)
+            fits |= column == "sd_xy" and "sd_x" in known
             first = column not in taken or column not in ("point", "photo", "column", "row", ROLE)
             names[k] = column if fits and first and column not in self.headings else heading
             taken.add(names[k])
@@ -116,11 +112,6 @@ class Columns:
 
 
 PLAIN = Columns()
-
-
-def is_photo(heading: str) -> bool:
-    """Return whether a heading is the column of photos."""
-    return " ".join(words_of(heading)) in PHOTO_WORDS
 
 
 def _places(heading: str, own: Sequence[str]) -> list[int]:
@@ -145,9 +136,7 @@ def columns_given(columns: str | None, roles: str | None) -> Columns:
     for word in words:
         name, equals, heading = (each.strip() for each in word.partition("="))
         if name.lower() != "-" and name.lower() not in OURS:
-            raise InputError(
-                phrase("format.unknown", what="column in --columns", value=name, names=list(OURS))
-            )
+            one_word(Place(), "column in --columns", name, OURS)
         if not equals:
             order.append(name.lower())
         elif name == "-":
@@ -176,17 +165,15 @@ def settled(
     messages: list[Message],
 ) -> ColumnTable:
     """Return a table of points with standard column names, units and role words."""
-    missing = [
-        each for each in (*columns.headings.values(), *columns.ignored) if not _places(each, table.own)
-    ]
+    users = (*columns.headings.values(), *columns.ignored)
+    missing = [each for each in users if not _places(each, table.own)]
     if missing and not columns.order:
         one_word(table.head, "heading in --columns", missing[0], table.own)
     if "point" in required:
         table = _with_points(table, names, messages)
     if lacking := [each for each in required if each not in table]:
-        raise table.head.error(
-            phrase("columns.missing", name=lacking[0], names=list(table.own), option=guess(table, known))
-        )
+        fields = {"name": lacking[0], "names": list(table.own), "option": guess(table, known)}
+        raise table.head.error(phrase("columns.missing", **fields))
     if name == "control":
         table = _with_roles(table, columns, messages)
     table = in_units(table, units, name, messages, columns.headings)
@@ -194,20 +181,16 @@ def settled(
     for column, own in table.headings:
         heading = columns.headings.get(column, own)
         if column in ("x", "y") and is_angular(own):
-            letters = "NS" if column == "x" else "EW"
-            cells[column] = table.numbers(column, read=partial(_on_axis, letters))
+            read = partial(degrees, other="NS" if column == "x" else "EW")
+            cells[column] = table.numbers(column, read=read)
         if column == "sd_xy":
             cells["sd_x"] = cells["sd_y"] = table.numbers(column, infinite=True)
         elif column in ("x", "y", "z") and heading.startswith("-") and heading.lower() != own:
             cells[column] = -table.numbers(column)
     wide = tuple(each for each in ("sd_x", "sd_y") if each in cells and each not in table.columns)
     check_unread(table, columns, known, name, messages)
-    return replace(
-        table,
-        cells=cells,
-        columns=(*table.columns, *wide),
-        own=(*(table.own or table.columns), *("" for _ in wide)),
-    )
+    names = (*(table.own or table.columns), *("" for _ in wide))
+    return replace(table, cells=cells, columns=(*table.columns, *wide), own=names)
 
 
 def in_units(
@@ -230,14 +213,8 @@ def in_units(
         words = [word for word in units_of(heading) if word in known or not _has_notes(column, own, word)]
         for word in words[:1]:
             if word not in known:
-                raise table.head.error(
-                    phrase(
-                        "columns.unit" if known else "columns.no-unit",
-                        column=own,
-                        unit=word,
-                        names=list(known),
-                    )
-                )
+                code = "columns.unit" if known else "columns.no-unit"
+                raise table.head.error(phrase(code, column=own, unit=word, names=list(known)))
             factor = known[word] / size
             parts.append(phrase("columns.in", unit=word))
         if (coverage := coverage_of(own)) is not None:
@@ -265,19 +242,11 @@ def _has_notes(column: str, own: str, word: str) -> bool:
 
 
 def is_geographic(table: ColumnTable) -> bool:
-    """Return whether the columns x and y of a table are longitudes and latitudes."""
     return all(axis in table and is_angular(heading_of(table, axis)) for axis in ("x", "y"))
 
 
 def heading_of(table: ColumnTable, column: str) -> str:
-    """Return the heading of an internal column in a table."""
     return dict(table.headings).get(column) or column
-
-
-def _on_axis(other: str, text: str) -> float:
-    if any(letter in text for letter in other):
-        raise ValueError(f"{quoted(text)} must not have a letter of the other axis")
-    return degrees(text)
 
 
 def _with_points(table: ColumnTable, names: Collection[str], messages: list[Message]) -> ColumnTable:
@@ -312,7 +281,7 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
         own, meaning = headings[column], column_of(headings[column])
         sure = column == ROLE and (ROLE in columns.headings or not _PLAIN_ROLES.isdisjoint(words_of(own)))
         if meaning in _FLAGS and not any(found):
-            words[column] = [_flag(table, column, row, meaning) for row in range(table.count)]
+            words[column] = [_flag(table, row, cell.lower(), meaning) for row, cell in enumerate(cells)]
         # Other types describe something else; columns without a heading of roles contain "check".
         elif (sure or any(found)) and (named or "check" in found):
             words[column] = found
@@ -330,8 +299,7 @@ def _with_roles(table: ColumnTable, columns: Columns, messages: list[Message]) -
     return table.renamed({column: ROLE}).with_texts(ROLE, uses)
 
 
-def _flag(table: ColumnTable, column: str, row: int, meaning: str) -> str:
-    word = table.texts(column)[row].lower()
+def _flag(table: ColumnTable, row: int, word: str, meaning: str) -> str:
     if word in TRUE | _MARKED:
         return "check" if meaning == "check" else "control"
     if word in FALSE or not word:
@@ -363,21 +331,21 @@ def check_unread(
     numbers = [
         own
         for column, own in others
-        if column not in columns.ignored
+        if name in STRICT
+        and column not in columns.ignored
         and column_of(own) not in ("", "point")
         and _is_numeric(table, column)
     ]
-    if numbers and name in STRICT:
+    if numbers:
         ignored = ",".join(f"-={own}" for own in numbers)
         unread = phrase("columns.numbers", names=numbers, option=guess(table, known), ignored=ignored)
         raise table.head.error(unread)
-    unread = phrase("columns.unread", table=name, names=[own for _, own in others])
-    if others and (remark := Message(unread, table.path)) not in messages:
+    remark = Message.of("columns.unread", table.path, table=name, names=[own for _, own in others])
+    if others and remark not in messages:
         messages.append(remark)
 
 
 def _unread(table: ColumnTable, known: Collection[str]) -> list[tuple[str, str]]:
-    """Return unread columns, by internal name and heading."""
     return [
         (column, own or column)
         for column, own in table.headings

@@ -14,6 +14,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.cards import filled_lines
 from photogram.formats.columns import heading_of
+from photogram.formats.crs import utm_system, utm_zone
 from photogram.formats.models import intersected
 from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.tables import Transform
@@ -33,7 +34,7 @@ WGS84 = "EPSG:4979"
 SYSTEMS = ("WGS84", "EPSG:", "+PROJ=")  # First words of a list, in capital letters
 _UTM = re.compile(r"WGS84\s+UTM\s+(\d{1,2})\s*([NS])", re.IGNORECASE)
 DIFFER = 1e-6
-_IMAGES = ("photo", "point", "column", "row")
+_POINTS, _IMAGES = ("point", "x", "y", "z"), ("photo", "point", "column", "row")
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ def system_of(line: str, place: Place) -> str:
     match = _UTM.fullmatch(line)
     if match is None or not 1 <= int(match[1]) <= 60:
         raise place.error(phrase("format.crs"))
-    return f"EPSG:{32600 + int(match[1]) + (100 if match[2].upper() == 'S' else 0)}"
+    return utm_system(int(match[1]), south=match[2].upper() == "S")
 
 
 def _of_text(path: Path) -> ControlList:
@@ -80,15 +81,14 @@ def _of_text(path: Path) -> ControlList:
         words = (place.text or "").split()
         if len(words) < 6:
             raise place.error(phrase("format.words", n=len(words), required="x y z column row image [name]"))
-        for word in (*words[:2], *words[3:5], *(() if words[2].lower() == "nan" else words[2:3])):
+        height = "" if words[2].lower() == "nan" else words[2]
+        for word in (*words[:2], *words[3:5], *([height] if height else [])):
             place.number(word)
-        position = (words[0], words[1], "" if words[2].lower() == "nan" else words[2])
-        name = (
-            words[6]
-            if len(words) > 6
-            else by_position.setdefault(position, f"control {len(by_position) + 1}")
-        )
-        if points.setdefault(name, position) != position and _apart(points[name], position):
+        position = (words[0], words[1], height)
+        named = words[6:7] or [by_position.setdefault(position, f"control {len(by_position) + 1}")]
+        name = named[0]
+        pairs = zip(points.setdefault(name, position), position, strict=True)
+        if any((a == "") != (b == "") or (a and abs(float(a) - float(b)) > DIFFER) for a, b in pairs):
             raise place.error(phrase("control-list.position", point=name, record=places[name]))
         places.setdefault(name, place.record or 0)
         # Pixels count from the centre of the first pixel.
@@ -97,27 +97,14 @@ def _of_text(path: Path) -> ControlList:
         records.append(place.record or 0)
     if not points:
         raise head.error(phrase("format.missing", what="points"))
-    control = _table(
-        head, ("point", *"xyz"), [(name, *own) for name, own in points.items()], [*places.values()]
-    )
+    control = _table(head, _POINTS, [(name, *own) for name, own in points.items()], [*places.values()])
     return ControlList(control, _table(head, _IMAGES, images, records), crs, [])
 
 
-def _apart(one: tuple[str, str, str], other: tuple[str, str, str]) -> bool:
-    return any(
-        (a == "") != (b == "") or (a and abs(float(a) - float(b)) > DIFFER)
-        for a, b in zip(one, other, strict=True)
-    )
-
-
 def _of_json(path: Path, project: Project) -> ControlList:
-    block = project.block
-    sizes = {
-        name: project.sizes[int(row)]
-        for name, row in zip(
-            block.photo_ids, block.photo_cameras if block.photo_cameras is not None else (), strict=False
-        )
-    }
+    cameras = [] if project.block.photo_cameras is None else project.block.photo_cameras.tolist()
+    pairs = zip(project.block.photo_ids, cameras, strict=False)
+    sizes = {name: project.sizes[row] for name, row in pairs}
     points: dict[str, tuple[str, str, str]] = {}
     images: list[tuple[str, ...]] = []
     messages = []
@@ -141,16 +128,13 @@ def _of_json(path: Path, project: Project) -> ControlList:
     head = Place(path)
     if not points:
         raise head.error(phrase("format.missing", what="points with a position"))
-    control = _table(
-        head, ("point", *"xyz"), [(name, *own) for name, own in points.items()], [1] * len(points)
-    )
+    control = _table(head, _POINTS, [(name, *own) for name, own in points.items()], [1] * len(points))
     return ControlList(control, _table(head, _IMAGES, images, [1] * len(images)), WGS84, messages)
 
 
 def _table(
     head: Place, columns: Sequence[str], rows: Sequence[tuple[str, ...]], records: Sequence[int]
 ) -> ColumnTable:
-    """Return rows of cells as the table of a file."""
     assert head.file is not None
     cells = {name: [row[k] for row in rows] for k, name in enumerate(columns)}
     return ColumnTable(head.file, head, tuple(columns), len(rows), cells, records)
@@ -212,25 +196,20 @@ def check_systems(
             if below and not above:
                 return [Message(phrase("control-system.below", option=_swap(table)), table.path)]
         return []
-    tried = [
-        (misfit(settings, change(values))[0], what, option)
-        for what, option, change in (_exchanges(table, values, free=free) if firm else ())
-    ]
-    tried += [
-        (misfit(own, values)[0], phrase("control-system.crs", crs=crs), f"--control-crs {crs}")
-        for crs, own in _systems(project, settings)
-    ]
+    exchanges = _exchanges(table, values, free=free) if firm else ()
+    tried = [(misfit(settings, change(values))[0], what, option) for what, option, change in exchanges]
+    for crs in _systems(project, settings):
+        apart, _ = misfit(replace(settings, crs={"control": crs}), values)
+        tried.append((apart, phrase("control-system.crs", crs=crs), f"--control-crs {crs}"))
     best, what, option = min(tried, key=lambda trial: trial[0], default=(np.inf, Phrase(""), ""))
     if firm:
         extent = max(extent, float(np.std(model[seen], axis=0).max()))
     if best < as_is / BETTER and (not firm or best < extent):
-        raise table.head.error(
-            phrase("control-system.exchange", factor=as_is / best, what=what, option=option)
-        )
+        fields = {"factor": as_is / best, "what": what, "option": option}
+        raise table.head.error(phrase("control-system.exchange", **fields))
     if not free and as_is > FAR * reach:
-        raise table.head.error(
-            phrase("control-system.far", distance=as_is, unit=block.linear_unit, extent=reach)
-        )
+        fields = {"distance": as_is, "unit": block.linear_unit, "extent": reach}
+        raise table.head.error(phrase("control-system.far", **fields))
     return []
 
 
@@ -266,11 +245,8 @@ def _exchanges(table: ColumnTable, values: Floats, *, free: bool) -> Iterator[Ex
         yield zone, option, lambda xyz: np.column_stack([xyz[:, 0] % ZONE, xyz[:, 1:]])
 
 
-def _systems(project: Project, settings: Settings) -> Iterator[tuple[str, Settings]]:
-    """Yield possible systems of control without one, if the project is georeferenced."""
+def _systems(project: Project, settings: Settings) -> tuple[str, ...]:
+    """Return possible systems of control without one, if the project is georeferenced."""
     if settings.crs.get("control") or project.frame.kind != "topocentric" or project.frame.origin is None:
-        return
-    latitude, longitude, _ = project.frame.origin
-    zone = int((longitude + 180) // 6) % 60 + 1
-    for crs in (f"EPSG:{(32600 if latitude >= 0 else 32700) + zone}", "EPSG:4979", "EPSG:3857"):
-        yield crs, replace(settings, crs={"control": crs})
+        return ()
+    return (utm_zone(*project.frame.origin[:2]), "EPSG:4979", "EPSG:3857")

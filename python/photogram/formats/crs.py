@@ -126,12 +126,24 @@ def _geocentric_of(origin: tuple[float, float, float]) -> Floats:
 
 def amid(crs: str, xyz: Floats) -> tuple[float, float, float]:
     """Return the rounded latitude, longitude and height of the mean of positions."""
-    middle = _transformed(GEOCENTRIC, GEOGRAPHIC, geocentric(crs, xyz).mean(axis=0)[np.newaxis])[0]
-    return (
-        round(float(middle[1]), ORIGIN_DECIMALS),
-        round(float(middle[0]), ORIGIN_DECIMALS),
-        float(round(middle[2])),
-    )
+    middle = geocentric(crs, xyz).mean(axis=0)[np.newaxis]
+    longitude, latitude, height = _transformed(GEOCENTRIC, GEOGRAPHIC, middle)[0].tolist()
+    return round(latitude, ORIGIN_DECIMALS), round(longitude, ORIGIN_DECIMALS), float(round(height))
+
+
+def utm_system(zone: int, *, south: bool) -> str:
+    """Return the system of a zone of UTM (WGS 84)."""
+    return f"EPSG:{(32700 if south else 32600) + zone}"
+
+
+def utm_zone(latitude: float, longitude: float) -> str:
+    """Return the system of the zone of UTM of a position in degrees."""
+    return utm_system(int((longitude + 180.0) // 6.0) % 60 + 1, south=latitude < 0)
+
+
+def in_degrees(xyz: Floats, geographic: bool = True) -> Floats:
+    """Return (n, 3) positions with longitudes and latitudes in degrees if they are geographic."""
+    return np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]]) if geographic else xyz
 
 
 def to_frame(crs: str, xyz: Floats, covariances: Floats, frame: Frame) -> tuple[Floats, Floats, list[Phrase]]:
@@ -204,17 +216,14 @@ def to_system(crs: str, xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
     and up at each position.
     """
     if frame.kind in ("cartesian", "geographic") and frame.crs == crs and crs:
-        own = (
-            np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]]) if frame.kind == "geographic" else xyz.copy()
-        )
+        own = in_degrees(xyz.copy(), frame.kind == "geographic")
         return own, np.broadcast_to(np.eye(3), (len(xyz), 3, 3)).copy()
     earth, own = _on_earth(xyz, frame)
     if (local := enu_origin(crs)) is not None:
         found: Floats = (earth - _geocentric_of(local)) @ east_north_up(local).T
     else:
         found = _transformed(GEOCENTRIC, _with_heights(crs), earth) - _geoid(crs)
-    turns: Floats = _axes(crs, found, earth) @ own.transpose(0, 2, 1)
-    return found, turns
+    return found, np.asarray(_axes(crs, found, earth) @ own.transpose(0, 2, 1))
 
 
 def is_on(crs: str, ellipsoid: tuple[float, float]) -> bool:
@@ -228,12 +237,8 @@ def is_on(crs: str, ellipsoid: tuple[float, float]) -> bool:
 
 def has_place(frame: Frame) -> bool:
     """Return whether the position of a frame on the earth is known."""
-    return (
-        (frame.kind == "topocentric" and frame.origin is not None)
-        or frame.kind == "geocentric"
-        or (frame.kind == "geographic" and bool(_geographic(frame)))
-        or (frame.kind == "cartesian" and bool(frame.crs))
-    )
+    places = {"topocentric": frame.origin, "geographic": _geographic(frame), "cartesian": frame.crs}
+    return frame.kind == "geocentric" or bool(places.get(frame.kind))
 
 
 def _geographic(frame: Frame) -> str:
@@ -253,14 +258,12 @@ def _on_earth(xyz: Floats, frame: Frame) -> tuple[Floats, Floats]:
     if frame.kind == "geocentric":
         return xyz, np.broadcast_to(np.eye(3), (len(xyz), 3, 3))
     if frame.kind == "geographic":
-        degrees = np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]])
-        return geocentric(_geographic(frame), degrees), local_frames(xyz)
+        return geocentric(_geographic(frame), in_degrees(xyz)), local_frames(xyz)
     earth = geocentric(frame.crs, xyz)
     return earth, _axes(frame.crs, xyz, earth)
 
 
 def is_projected(crs: str) -> bool:
-    """Return whether a system has eastings and northings of a projection."""
     return axes_of(crs)[0][0] == "easting"
 
 

@@ -25,7 +25,6 @@ from photogram.results.datum import point_kinds
 from photogram.show.judgement import remarks_section
 from photogram.show.page import Document, Fact, Facts, Remarks, Section, Text, significant
 from photogram.show.quantity import Quantity, Table, column, of_each
-from photogram.words import phrase
 
 MOST_TRAJECTORIES = 12  # Largest number of trajectories in reports
 MOST_RAYS = 10  # Points with more rays are counted together
@@ -40,8 +39,8 @@ def described(project: Project) -> Document:
     corner = "pixels from the upper-left corner" if down else ""
     conventions = [Fact("Frame", str(project.frame)), Fact("Unit", block.linear_unit)]
     conventions.append(Fact("Image coordinates", block.image_unit, note=corner))
-    if found.images:
-        note = f"{found.images} images with the positions of the file"
+    if images := len(found.xy):
+        note = f"{images} images with the positions of the file"
         residual = Fact.of("Median residual", found.median, camera_unit(block), figures=3, note=note)
         conventions.append(residual)
     return Document(
@@ -112,10 +111,8 @@ def _size(project: Project) -> tuple[Facts, dict[str, Any]]:
 def _cameras(project: Project) -> Table:
     cameras, which = known_cameras(project.block)
     sizes = [*project.sizes, *[None] * len(cameras)][: len(cameras)]
-    values = [
-        ", ".join(f"{name} {significant(value, 7)}" for name, value in each.parameters.items() if value)
-        for each in cameras
-    ]
+    given = [{name: value for name, value in each.parameters.items() if value} for each in cameras]
+    values = [", ".join(f"{name} {significant(value, 7)}" for name, value in own.items()) for own in given]
     columns = [
         of_each(cameras, "title", kind="name", name="name", head="Camera"),
         of_each(cameras, "model", kind="name", name="model", head="Model"),
@@ -146,6 +143,7 @@ def _trajectories(project: Project) -> list[Facts | Table]:
         facts.append(Fact("Times", str(settings.times)))
     moments = [(each.moment.trajectory, each.label) for each in block.observations if each.moment is not None]
     kinds_on = [Counter(label for one, label in moments if one is each) for each in shared]
+    counted_kinds = [listed([f"{n} {kind}" for kind, n in each.items()]) for each in kinds_on]
     columns = [
         of_each(shared, "name", kind="name", name="name", head="Trajectory"),
         column("photos", [sum(one.trajectory is each for one in block.timed) for each in shared], "Photos"),
@@ -162,11 +160,7 @@ def _trajectories(project: Project) -> list[Facts | Table]:
             )
             for k, (name, head) in enumerate({"position": "Position", "rotation": "Rotation"}.items())
         ),
-        Quantity(
-            [listed([f"{n} {kind}" for kind, n in each.items()]) for each in kinds_on],
-            kind="name",
-            head="Observations",
-        ),
+        Quantity(counted_kinds, kind="name", head="Observations"),
         Quantity([dict(each) for each in kinds_on], member="observations"),
     ]
     hidden = len(shared) - MOST_TRAJECTORIES
@@ -191,40 +185,38 @@ NEARLY_ALL = 0.9
 
 @dataclass(frozen=True)
 class Agreement:
-    """Agreement of observations with positions of a file."""
+    """Observations used, for comparison with the images of the positions of a file."""
 
-    median: float  # Median length of residuals, in the unit of the images; NaN without any
-    behind: float  # Fraction of points behind their photos
-    images: int  # Number of observations used
-
-
-@dataclass(frozen=True)
-class _Sample:
     cameras: list[Camera]
     which: Indices
-    vectors: Floats
-    matrices: Floats
+    vectors: Floats  # From the projection centres to the points
+    matrices: Floats  # Object to photo
     xy: Floats
 
-    def residuals(self) -> Floats:
-        directions = np.einsum("nij,nj->ni", self.matrices, self.vectors)
+    @property
+    def directions(self) -> Floats:
+        """Directions to the points in the axes of the photos."""
+        return np.asarray(np.einsum("nij,nj->ni", self.matrices, self.vectors))
+
+    @property
+    def median(self) -> float:
+        """Median length of residuals, in the unit of the images; NaN without any."""
+        directions = self.directions
         with np.errstate(all="ignore"):
             images = images_of(self.cameras, self.which, directions)
         lengths = np.linalg.norm(images - self.xy, axis=1)
-        return np.asarray(np.where(np.isfinite(lengths) & (directions[:, 2] < 0), lengths, np.inf))
+        seen = np.isfinite(lengths) & (directions[:, 2] < 0)
+        return float(np.median(np.where(seen, lengths, np.inf))) if len(self.xy) else np.nan
 
-    def mirrored(self, axis: int) -> _Sample:
-        """Return the sample with image coordinates reversed about the principal point."""
+    def mirrored(self, axis: int) -> Agreement:
+        """Return the observations reversed about the principal point."""
         xy, axes = self.xy.copy(), np.tile([0.0, 0.0, -1.0], (len(self.xy), 1))
         middle = images_of(self.cameras, self.which, axes)
         xy[:, axis] = 2 * middle[:, axis] - xy[:, axis]
         return replace(self, xy=xy)
 
-    def median(self) -> float:
-        return float(np.median(self.residuals())) if len(self.xy) else np.nan
 
-
-def _sample(project: Project) -> _Sample:
+def agreement(project: Project) -> Agreement:
     block = project.block
     points, matrices = project.positions(), attitude_matrices(block)
     poses = np.column_stack([matrices.reshape(-1, 9), block.photo_positions])
@@ -253,22 +245,9 @@ def _sample(project: Project) -> _Sample:
         if own.sensor is not None:
             places[of_photo] += turned @ own.sensor.position
             axes[of_photo] = turned @ own.sensor.attitude
-    return _Sample(
-        cameras,
-        np.asarray(photo_cameras, dtype=np.int64)[photos],
-        points[block.image_points[rows]] - places,
-        axes.transpose(0, 2, 1),
-        xy,
-    )
-
-
-def agreement(project: Project) -> Agreement:
-    """Return the agreement of observations with positions of a file."""
-    sample = _sample(project)
-    if not len(sample.xy):
-        return Agreement(np.nan, 0.0, 0)
-    depths = np.einsum("nij,nj->ni", sample.matrices, sample.vectors)[:, 2]
-    return Agreement(sample.median(), float(np.mean(depths > 0)), len(sample.xy))
+    which = np.asarray(photo_cameras, dtype=np.int64)[photos]
+    vectors = points[block.image_points[rows]] - places
+    return Agreement(cameras, which, vectors, axes.transpose(0, 2, 1), xy)
 
 
 def doubts(project: Project) -> list[Message]:
@@ -277,28 +256,26 @@ def doubts(project: Project) -> list[Message]:
     The project is not changed.
     """
     found = agreement(project)
-    if not found.images:
+    if not len(found.xy):
         return []
-    messages = []
-    if found.behind > NEARLY_ALL:
-        messages.append(Message(phrase("agreement.mirrored", percent=100 * found.behind)))
-    elif found.behind > 0:
-        messages.append(Message(phrase("agreement.behind", percent=100 * found.behind)))
+    messages, behind, median = list[Message](), float(np.mean(found.directions[:, 2] > 0)), found.median
+    if behind > 0:
+        code = "agreement.mirrored" if behind > NEARLY_ALL else "agreement.behind"
+        messages.append(Message.of(code, percent=100 * behind))
     widths = [size[0] for size in project.sizes if size is not None]
     scale = float(np.median(project.block.camera_scales()))
     limit = max(GROSS, PART * min(widths)) if widths and camera_unit(project.block) == "px" else PART * scale
-    if found.median > limit:
-        sample = _sample(project)
-        helps = [name for name, change in _OTHERS.items() if change(sample).median() * BETTER < found.median]
+    if median > limit:
+        helps = [name for name, change in _OTHERS.items() if change(found).median * BETTER < median]
         code = "agreement.convention" if helps else "agreement.residuals"
-        fields = {"median": found.median, "unit": camera_unit(project.block), "names": helps}
+        fields = {"median": median, "unit": camera_unit(project.block), "names": helps}
         messages.append(Message.of(code, **fields, factor=BETTER))
     return messages
 
 
-_OTHERS: dict[str, Callable[[_Sample], _Sample]] = {
-    "y (rows) in the opposite direction": lambda sample: sample.mirrored(1),
-    "x (columns) in the opposite direction": lambda sample: sample.mirrored(0),
-    "transposed rotations": lambda sample: replace(sample, matrices=sample.matrices.transpose(0, 2, 1)),
-    "photos in the opposite direction": lambda sample: replace(sample, matrices=Y_DOWN @ sample.matrices),
+_OTHERS: dict[str, Callable[[Agreement], Agreement]] = {
+    "y (rows) in the opposite direction": lambda found: found.mirrored(1),
+    "x (columns) in the opposite direction": lambda found: found.mirrored(0),
+    "transposed rotations": lambda found: replace(found, matrices=found.matrices.transpose(0, 2, 1)),
+    "photos in the opposite direction": lambda found: replace(found, matrices=Y_DOWN @ found.matrices),
 }

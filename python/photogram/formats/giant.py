@@ -8,50 +8,39 @@ from pathlib import Path
 from photogram.adjustment.options import AdjustOptions
 from photogram.errors import InputError, message_of
 from photogram.formats.format import FORMATS
-from photogram.formats.project import Project
+from photogram.formats.project import Project, frame_of
 from photogram.formats.read_options import ReadOptions
+from photogram.giant import Project as GiantProject
+from photogram.giant import read_project
+from photogram.giant.assembly import job_refraction
 from photogram.giant.files import to_bytes
 from photogram.messages import Message
-from photogram.network.frame import Frame
 from photogram.words import Phrase, phrase
 
 
 def read(path: Path, options: ReadOptions) -> Project:
     """Read a project, with the refraction of its COMMON."""
-    from photogram.giant import read_project  # detection of formats does not need the cards
-    from photogram.giant.assembly import job_refraction
-
-    del options
     found = read_project(path)
-    block = found.to_block()
-    block = block.replace(refraction=job_refraction(found.common))
+    block = found.to_block().replace(refraction=job_refraction(found.common))
     messages = list(found.messages)
     if found.common.intersection_only:
-        messages.append(Message(phrase("format.intersection"), path))
+        messages.append(Message.of("format.intersection", path))
     return Project(
         block=block,
         path=path,
         title=FORMATS["giant"].title,
-        frame=Frame("geographic", ellipsoid=(block.spheroid.a, block.spheroid.b))
-        if block.spheroid
-        else Frame(),
+        frame=frame_of(block),
         options=AdjustOptions(unit_variance=found.common.unbiased_variance),
         messages=tuple(messages),
     )
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the five files."""
-    from photogram.giant import Project as GiantProject
-
     records = GiantProject.from_block(project.block).records()
     return {name: to_bytes(lines) for name, lines in records.items()}
 
 
 def cannot_hold(project: Project) -> list[Phrase]:
-    """Return parts of a project that the cards cannot contain."""
-    from photogram.giant import Project as GiantProject
-
     try:
         GiantProject.from_block(project.block)
     except InputError as error:

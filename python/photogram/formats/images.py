@@ -77,14 +77,12 @@ def named_pixels(project: Project) -> Iterator[tuple[str, str, float, float]]:
 
 
 def known_size(camera: Camera, size: Size | None) -> Size:
-    """Return the image size of a camera; raise an error if it is unknown."""
     if size is None:
         raise InputError(phrase("format.image-size", camera=camera.title))
     return size
 
 
 def sizes_of(project: Project) -> Sequence[Size]:
-    """Return width and height of the images of each camera."""
     return [known_size(each, size) for each, size in zip(project.block.cameras, project.sizes, strict=True)]
 
 

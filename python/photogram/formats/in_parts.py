@@ -11,8 +11,8 @@ import hashlib
 import shutil
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from functools import cached_property, reduce
+from contextlib import closing, contextmanager
+from functools import cached_property, partial, reduce
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -154,7 +154,6 @@ class Streamed:
         return self._spread_out[1]
 
     def close(self) -> None:
-        """Remove the buckets."""
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def source(self, options: CoreOptions) -> str:
@@ -222,11 +221,11 @@ class Streamed:
             }
             counts += np.bincount(self._vertices[images.photos], minlength=len(counts))
             start += len(xy)
-            of_points = np.array(
-                [0 if name in self._tied else zlib.crc32(name.encode()) % buckets for name in names.tolist()],
-                dtype=np.int64,
-            )
-            self._divide(batch, of_points[images.points], [f"bucket-{k}" for k in range(buckets)], number)
+            of_points = [
+                0 if name in self._tied else zlib.crc32(name.encode()) % buckets for name in names.tolist()
+            ]
+            of_images = np.array(of_points, dtype=np.int64)[images.points]
+            self._divide(batch, of_images, [f"bucket-{k}" for k in range(buckets)], number)
         for k in range(buckets):
             bucket = self._gathered(f"bucket-{k}", [] if k else list(self._tied))
             records, photos, points = bucket.pop("records"), bucket["photos"], bucket["points"]
@@ -254,12 +253,9 @@ class Streamed:
         pieces = [read_arrays(each) for each in sorted(place.glob("*.npz"))]
         shutil.rmtree(place, ignore_errors=True)
         rows = {name: row for row, name in enumerate(names)}
-        points = [
-            np.array([rows.setdefault(name, len(rows)) for name in piece["names"].tolist()], dtype=np.int64)
-            for piece in pieces
-        ]
-        for own, piece in zip(points, pieces, strict=True):
-            piece["points"] = own[piece["points"]]
+        for piece in pieces:
+            points = [rows.setdefault(name, len(rows)) for name in piece["names"].tolist()]
+            piece["points"] = np.array(points, dtype=np.int64)[piece["points"]]
         found = {
             name: np.concatenate([none, *(piece[name] for piece in pieces if name in piece)])
             for name, none in _EMPTY.items()
@@ -284,17 +280,14 @@ class Streamed:
         rows = np.array([self._given.get(name, -1) for name in names], dtype=np.int64)
         known = rows >= 0
         positions, sd = np.full((len(names), 3), np.nan), np.full((len(names), 3), np.inf)
-        positions[known], sd[known] = (
-            self.block.point_positions[rows[known]],
-            self.block.point_sd[rows[known]],
-        )
+        positions[known] = self.block.point_positions[rows[known]]
+        sd[known] = self.block.point_sd[rows[known]]
         images = {f"image_{name}": found[name] for name in ("photos", "points", "xy", "sd")}
         arrays = {"point_ids": names, "point_positions": positions, "point_sd": sd, **images}
         return {"points": np.full(len(names), -1, dtype=np.int64), "images": found["rows"]}, arrays
 
 
 def _selected(parts: Iterable[ColumnTable], wanted: Callable[[ColumnTable], Bools]) -> ColumnTable | None:
-    """Return the wanted rows of batches; None without batches."""
     found = [table.some(np.flatnonzero(wanted(table)).tolist()) for table in parts]
     return reduce(ColumnTable.joined, found) if found else None
 
@@ -302,9 +295,7 @@ def _selected(parts: Iterable[ColumnTable], wanted: Callable[[ColumnTable], Bool
 def document(run: Run, outcome: Outcome) -> Document:
     """Return the document of an adjustment: sizes, sums of squares, iterations."""
     observations, weighted, unknowns = outcome.counts
-    photos, points, images = (
-        sum(each) for each in (run.manifest.photos, run.manifest.points, run.manifest.images)
-    )
+    photos, points, images = (sum(getattr(run.manifest, name)) for name in ("photos", "points", "images"))
     groups = dict(zip(("camera", "ground", "plates", "observations"), outcome.sums_of_squares, strict=True))
     groups["total"] = sum(outcome.sums_of_squares)
     facts = [
@@ -337,19 +328,14 @@ def on_disk(
 
     `change` returns the options for the options of the project.
     """
-    with ExitStack() as stack:
-        stack.enter_context(alone(folder))
-        streamed = Streamed(path, reading, folder)
-        stack.callback(streamed.close)
+    with alone(folder), closing(Streamed(path, reading, folder)) as streamed:
         options = core_options(change(streamed.project.options), streamed.block)
         source = streamed.source(options)
-        with opened(
-            folder,
-            source,
-            len(streamed.block.photo_ids),
-            lambda parts: streamed.counted(parts)[1],
-            lambda parts: streamed.divided(folder, parts, options, source),
-            division,
-            threads,
-        ) as run:
+        written = partial(streamed.divided, folder, options=options, source=source)
+
+        def counts(parts: int) -> Counts:
+            return streamed.counted(parts)[1]
+
+        photos = len(streamed.block.photo_ids)
+        with opened(folder, source, photos, counts, written, division, threads) as run:
             yield run

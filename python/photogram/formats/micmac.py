@@ -23,6 +23,7 @@ from photogram.words import Phrase, phrase
 
 SET, OF_IMAGE = "SetOfMesureAppuisFlottants", "MesureAppuiFlottant1Im"
 SCANS, CAMERA, NAMES = "Ori-InterneScan", "MeasuresCamera.xml", "id_fiducial.txt"
+_IMAGES = "MeasuresIm-*.xml"
 AMID = 0.1  # Distance of the mean of marks from the origin, relative to the format, for a corner origin
 
 
@@ -52,14 +53,11 @@ class MicmacMarks:
 
 
 def has_marks(folder: Path) -> bool:
-    """Return whether a folder contains MicMac readings of marks."""
-    return bool(_of_images(folder)[1])
+    return any(_scans(folder).glob(_IMAGES))
 
 
-def _of_images(folder: Path) -> tuple[Path, list[Path]]:
-    """Return the folder of the readings of marks, and the files of the images."""
-    scans = folder / SCANS if (folder / SCANS).is_dir() else folder
-    return scans, sorted(scans.glob("MeasuresIm-*.xml"))
+def _scans(folder: Path) -> Path:
+    return folder / SCANS if (folder / SCANS).is_dir() else folder
 
 
 def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
@@ -82,10 +80,14 @@ def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
         If a file is missing, unreadable or of another type. If a mark is repeated or missing in the camera,
         or the names in `id_fiducial.txt` differ from the marks of the camera.
     """
-    scans, files = _of_images(folder)
-    if not files:
-        raise InputError(phrase("format.files", name="MeasuresIm-*.xml"), file=scans)
-    path = camera or _beside(scans, folder, CAMERA) or scans / CAMERA
+    scans = _scans(folder)
+    if not (files := sorted(scans.glob(_IMAGES))):
+        raise InputError(phrase("format.files", name=_IMAGES), file=scans)
+    folders = (scans, folder, scans.parent)
+    camera_file, names = (
+        next((each / name for each in folders if (each / name).is_file()), None) for name in (CAMERA, NAMES)
+    )
+    path = camera or camera_file or scans / CAMERA
     places = _measures(path)
     if len(places) != 1:
         raise InputError(phrase("micmac.images", n=len(places)), file=path)
@@ -98,7 +100,11 @@ def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
             if photo in readings:
                 raise InputError(phrase("format.repeated", what="photo", name=photo), file=file)
             readings[photo] = own
-    remarks = _named(scans, folder, path, down, readings)
+    read = {mark for own in readings.values() for mark in own}
+    missing = [mark for mark in down if mark not in read]
+    remarks = [phrase("micmac.unread", names=missing, n=len(missing))] if missing else []
+    if names is not None:
+        _check_names(names, path, down)
     turned, remark = _turned(down, readings)
     middle = np.mean([*down.values()], axis=0)
     if np.abs(middle).max() > AMID * np.ptp([*down.values()], axis=0).max():
@@ -110,24 +116,8 @@ def read_marks(folder: Path, camera: Path | None = None) -> MicmacMarks:
     return MicmacMarks(amid, readings, turned, (remark, *remarks))
 
 
-def _beside(scans: Path, folder: Path, name: str) -> Path | None:
-    files = (each / name for each in (scans, folder, scans.parent))
-    return next((each for each in files if each.is_file()), None)
-
-
-def _named(
-    scans: Path,
-    folder: Path,
-    camera: Path,
-    places: Mapping[str, Floats],
-    readings: Mapping[str, Mapping[str, Floats]],
-) -> list[Phrase]:
-    """Compare names with marks of the camera; report marks without readings."""
-    read = {mark for own in readings.values() for mark in own}
-    missing = [mark for mark in places if mark not in read]
-    remarks = [phrase("micmac.unread", names=missing, n=len(missing))] if missing else []
-    if (path := _beside(scans, folder, NAMES)) is None:
-        return remarks
+def _check_names(path: Path, camera: Path, places: Mapping[str, Floats]) -> None:
+    """Reject names that differ from the marks of the camera."""
     given: set[str] = set()
     for record, line in enumerate(read_lines(path), 1):
         name = line.strip()
@@ -137,7 +127,6 @@ def _named(
         given.add(name)
     if unnamed := [mark for mark in places if mark not in given]:
         raise InputError(phrase("micmac.unnamed", names=unnamed, file=camera.name), file=path)
-    return remarks
 
 
 def _turned(
@@ -188,20 +177,19 @@ def write_marks(project: Project) -> dict[str, bytes]:
     photos: dict[str, dict[str, Floats]] = {}
     for each in films.readings:
         photos.setdefault(each.photo, {})[films.by_mark[id(each.mark)]] = each.observed[:2]
-    files = {
-        f"{SCANS}/MeasuresIm-{photo}.xml": _document(photo, own, whole=True) for photo, own in photos.items()
-    }
     names = "".join(f"{name}\n" for name in places).encode()
-    return {NAMES: names, f"{SCANS}/{CAMERA}": _document("Glob", places, whole=False)} | files
+    files = {NAMES: names, f"{SCANS}/{CAMERA}": _document("Glob", places, whole=False)}
+    for photo, own in photos.items():
+        files[f"{SCANS}/MeasuresIm-{photo}.xml"] = _document(photo, own, whole=True)
+    return files
 
 
 def _document(image: str, marks: Mapping[str, Floats], *, whole: bool) -> bytes:
     lines = [f"<{OF_IMAGE}>", f"<NameIm>{escape(image)}</NameIm>"]
     for name, xy in marks.items():
         x, y = xy.tolist()
-        lines.append(
-            f"<OneMesureAF1I><NamePt>{escape(name)}</NamePt><PtIm>{x!r} {y!r}</PtIm></OneMesureAF1I>"
-        )
+        place = f"<NamePt>{escape(name)}</NamePt><PtIm>{x!r} {y!r}</PtIm>"
+        lines.append(f"<OneMesureAF1I>{place}</OneMesureAF1I>")
     lines.append(f"</{OF_IMAGE}>")
     if whole:
         lines = [f"<{SET}>", *lines, f"</{SET}>"]

@@ -21,12 +21,7 @@ from photogram.network.cameras import Camera
 from photogram.network.directions import image_directions
 from photogram.network.films import Scan
 from photogram.network.frame import Frame
-from photogram.network.geometry import (
-    Cartesian,
-    Spheroid,
-    lengths_of_units,
-    local_frames,
-)
+from photogram.network.geometry import Cartesian, Spheroid, lengths_of_units, local_frames
 from photogram.network.motion import on_shared, scanners
 from photogram.network.observations import Control, Position
 from photogram.network.rays import LocalAxes, meet_rays
@@ -38,10 +33,8 @@ def known_cameras(block: Block) -> tuple[list[Camera], list[int]]:
     """Return cameras (also for principal distances), and the one of each photo."""
     if block.cameras:
         assert block.photo_cameras is not None
-        cameras = [
-            each if each.name else each.replace(name=name)
-            for each, name in zip(block.cameras, block.camera_names, strict=True)
-        ]
+        pairs = zip(block.cameras, block.camera_names, strict=True)
+        cameras = [each if each.name else each.replace(name=name) for each, name in pairs]
         return cameras, block.photo_cameras.tolist()
     distances = block.known_distances("the file").tolist()
     places = {each: row for row, each in enumerate(dict.fromkeys(distances))}
@@ -55,7 +48,6 @@ def attitude_matrices(block: Block) -> Floats:
 
 
 def correlated_control(block: Block) -> dict[str, Control]:
-    """Return control with correlated coordinates by point name."""
     return {each.point: each for each in block.observations.of_type(Control)}
 
 
@@ -94,12 +86,10 @@ def known_points(project: Project) -> KnownPoints:
 
 def check_images(block: Block, title: str) -> None:
     """Reject image coordinates of films or line scanners."""
-    scanned = [each.photo for each in block.passages if isinstance(each, Scan)]
-    if scanned:
-        raise InputError(phrase("format.film", title=title, photo=scanned[0]))
-    lines = [each.photo for each in block.timed if each.lines is not None]
-    if lines:
-        raise InputError(phrase("format.scanner", photo=lines[0]))
+    for scan in (each for each in block.passages if isinstance(each, Scan)):
+        raise InputError(phrase("format.film", title=title, photo=scan.photo))
+    for strip in (each for each in block.timed if each.lines is not None):
+        raise InputError(phrase("format.scanner", photo=strip.photo))
 
 
 def intersected(project: Project, points: Indices) -> Floats:
@@ -139,16 +129,11 @@ def carried(project: Project, by: tuple[float, Floats, Floats], frame: Frame, me
     """Return a project transformed by scale, (3, 3) rotation, (3,) translation."""
     block = project.block
     scale, turn, shift = by
-    return project.replace(
-        block=block.replace(
-            photo_positions=scale * block.photo_positions @ turn.T + shift,
-            photo_attitudes=known_angles("omega_phi_kappa", turn @ attitude_matrices(block)),
-            photo_to_ground=False,
-        ),
-        starts=scale * project.starts @ turn.T + shift,
-        frame=frame,
-        messages=(*project.messages, message),
-    )
+    positions = scale * block.photo_positions @ turn.T + shift
+    angles = known_angles("omega_phi_kappa", turn @ attitude_matrices(block))
+    moved = block.replace(photo_positions=positions, photo_attitudes=angles, photo_to_ground=False)
+    starts = scale * project.starts @ turn.T + shift
+    return project.replace(block=moved, starts=starts, frame=frame, messages=(*project.messages, message))
 
 
 def chosen_model(
@@ -240,25 +225,15 @@ def in_pixels(project: Project) -> Project:
             reach = np.abs(xy[own]).max(axis=0, initial=1.0) * (2 if camera.image_y == "up" else 1)
             size = (ROUND * math.ceil(reach[0] / ROUND), ROUND * math.ceil(reach[1] / ROUND))
         sizes.append(size)
-    return project.replace(
-        block=block.replace(
-            cameras=made,
-            photo_cameras=which,
-            principal_distances=None,
-            image_xy=xy,
-            image_sd=sd,
-            timed=(),
-        ),
-        sizes=tuple(sizes),
-        pixel_mm=tuple(pixels),
-    )
+    images = {"image_xy": xy, "image_sd": sd, "timed": ()}
+    block = block.replace(cameras=made, photo_cameras=which, principal_distances=None, **images)
+    return project.replace(block=block, sizes=tuple(sizes), pixel_mm=tuple(pixels))
 
 
 def nominal_pixels(project: Project) -> list[Phrase]:
-    """Return remarks on nominal sizes of pixels and images."""
     nominal = project.block.image_unit == "mm" and None in (project.pixel_mm or (None,))
-    found = [phrase("lost.nominal-pixels", size=NOMINAL_MM)] if nominal else []
-    return found + ([phrase("lost.image-size")] if _unsized(project) else [])
+    codes = {"lost.nominal-pixels": nominal, "lost.image-size": _unsized(project)}
+    return [phrase(code, size=NOMINAL_MM) for code, is_lost in codes.items() if is_lost]
 
 
 def _unsized(project: Project) -> bool:
@@ -334,12 +309,9 @@ def topocentric_remarks(project: Project) -> list[Phrase | str]:
     origin = _origin(block)
     up = local_frames(np.vstack([origin, block.photo_positions]))[:, 2]
     angle = math.degrees(float(np.arccos(np.clip(up[1:] @ up[0], -1, 1)).max())) * 60
-    longitude, latitude = np.degrees(origin[0, :2])
-    place = {"latitude": float(latitude), "longitude": float(longitude)}
-    ellipsoid = {"a": block.spheroid.a, "b": block.spheroid.b}
-    found: list[Phrase | str] = [
-        phrase("lost.geographic", unit=block.linear_unit, **place, **ellipsoid, angle=angle)
-    ]
+    place = zip(("longitude", "latitude"), np.degrees(origin[0, :2]).tolist(), strict=True)
+    fields = {"unit": block.linear_unit, "a": block.spheroid.a, "b": block.spheroid.b, **dict(place)}
+    found: list[Phrase | str] = [phrase("lost.geographic", **fields, angle=angle)]
     if n := len(block.observations):
         found.append(phrase("lost.observations", n=n, names=["images"]))
     return found

@@ -29,19 +29,16 @@ def with_names(project: Project, path: Path) -> Project:
     """Return a project with point names from a table `point`, `name`."""
     table = read_columns(path, known=("point", "name"))
     table.require("point", "name")
-    places = {name: row for row, name in enumerate(project.block.point_ids)}
-    rows, names = indices_of(table, "point", places, "point").tolist(), table.texts("name")
+    old = project.block.point_ids
+    rows = indices_of(table, "point", {name: row for row, name in enumerate(old)}, "point")
+    names = table.texts("name")
     table.names("name")
-    ids = list(project.block.point_ids)
-    for place, name in zip(rows, names, strict=True):
-        ids[place] = name
+    new = {old[place]: name for place, name in zip(rows.tolist(), names, strict=True)}
     taken: dict[str, int] = {}
-    for row, name in enumerate(ids):
+    for row, name in enumerate(new.get(name, name) for name in old):
         if taken.setdefault(name, row) != row:
-            first = next(k for k, each in enumerate(names) if each == name)
-            raise table.error(first, phrase("format.repeated", what="point", name=name))
-    new = {project.block.point_ids[place]: name for place, name in zip(rows, names, strict=True)}
-    message = Message(phrase("format.renamed", n=len(rows), file=path.name), path)
+            raise table.error(names.index(name), phrase("format.repeated", what="point", name=name))
+    message = Message.of("format.renamed", path, n=len(rows), file=path.name)
     return with_other_names(project, new).replace(messages=(*project.messages, message))
 
 
@@ -57,15 +54,12 @@ def with_other_names(project: Project, new: Mapping[str, str]) -> Project:
         "point numbers": {own: name for own, name in zip(ids, first, strict=True) if name.isdigit()},
     }
     again = project.repeated
+    observations = project.block.observations.with_point_names(new)
+    features = project.features.items()
     return project.replace(
-        block=project.block.replace(
-            point_ids=ids, observations=project.block.observations.with_point_names(new)
-        ),
+        block=project.block.replace(point_ids=ids, observations=observations),
         details=details,
-        features={
-            each: (kind, [new.get(point, point) for point in points])
-            for each, (kind, points) in project.features.items()
-        },
+        features={name: (kind, [new.get(own, own) for own in points]) for name, (kind, points) in features},
         statement=asked_by_other_names(project.statement, new),
         repeated=replace(again, points=tuple(new.get(point, point) for point in again.points)),
         tracks=project.tracks.difference(new),
@@ -87,13 +81,12 @@ def read_names(path: Path) -> dict[str, str]:
 
 def numbered(names: Sequence[str], known: Mapping[str, str | int] | None = None) -> dict[str, int]:
     """Return a number for each name: known, its own, otherwise 1, 2, ..."""
-    given = known or {}
-    if all(name in given for name in names):
-        return {name: int(given[name]) for name in names}
-    if all(
-        name.isascii() and name.isdigit() and str(int(name)) == name and int(name) < LARGEST for name in names
-    ):
-        return {name: int(name) for name in names}
+    if known is not None and all(name in known for name in names):
+        return {name: int(known[name]) for name in names}
+    if all(name.isascii() and name.isdigit() and str(int(name)) == name for name in names):
+        numbers = {name: int(name) for name in names}
+        if max(numbers.values(), default=0) < LARGEST:
+            return numbers
     return {name: number for number, name in enumerate(names, 1)}
 
 
@@ -112,5 +105,4 @@ class NamedValues(UserDict[str, T]):
 
     @cached_property
     def data(self) -> dict[str, T]:  # type: ignore[override]
-        """The dictionary."""
         return dict(zip(self._names, np.asarray(self._values).tolist(), strict=True))

@@ -12,6 +12,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError, message_of
 from photogram.formats.builder import BlockBuilder
+from photogram.formats.crs import GEOGRAPHIC, from_frame
 from photogram.formats.format import FORMATS
 from photogram.formats.images import Y_DOWN, lens_with, named_pixels, pixel_rows, sizes_of
 from photogram.formats.models import (
@@ -42,7 +43,6 @@ UNKNOWN_DOP = 15.0  # Metres: default of OpenSfM
 NO_HEIGHT = 1e4  # Metres: standard deviation of heights that are not observed
 _VERSIONS = {"OPENSFM_TRACKS_VERSION_v1": 9, "OPENSFM_TRACKS_VERSION_v2": 11}
 _FIRST = 8
-_NO_TRACKS = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty((0, 2))
 
 
 def read(path: Path, options: ReadOptions) -> Project:
@@ -72,20 +72,18 @@ def read(path: Path, options: ReadOptions) -> Project:
     points = dict(model.get("points", {}).items())
     starts = np.array([each["coordinates"].numbers(3) for each in points.values()]).reshape(-1, 3)
     block.points(list(points), starts)
-    if (folder / TRACKS).is_file():
-        photos, tracks, xy = _tracks(folder / TRACKS, list(shots), list(points), messages)
-    else:
-        photos, tracks, xy = _NO_TRACKS
+    file = folder / TRACKS
+    photos, tracks, xy = _tracks(file, list(shots), list(points), messages)
+    if not file.is_file():
         block.lacks.append(Phrase("read.tracks", {"file": TRACKS, "option": Phrase("option.images")}))
     sizes = np.array(block.sizes, dtype=float)[np.array(block.photo_cameras)[photos]]
     block.images(photos, tracks, sizes / 2 + sizes.max(axis=1, keepdims=True) * xy)
     block.observations += _gps(shots, options, messages)
-    for file in ("gcp_list.txt", "ground_control_points.json"):
-        if (folder / file).is_file():
-            messages.append(Message(phrase("opensfm.control", file=file, path=folder / file)))
-    colours = {
-        name: [int(c) for c in each.get("color", [0, 0, 0]).numbers(3)] for name, each in points.items()
-    }
+    for name in ("gcp_list.txt", "ground_control_points.json"):
+        if (folder / name).is_file():
+            messages.append(Message.of("opensfm.control", file=name, path=folder / name))
+    given = {name: each.get("color", [0, 0, 0]).numbers(3) for name, each in points.items()}
+    colours = {name: list(map(int, colour)) for name, colour in given.items()}
     return block.project(details={"colours": colours}).replace(tracks=frozenset(points))
 
 
@@ -150,9 +148,8 @@ def _gps(shots: dict[str, Tree], options: ReadOptions, messages: list[Message]) 
             sd[2] = NO_HEIGHT
         deviations.append(sd)
     messages.append(Message(phrase("opensfm.gnss", n=len(given))))
-    return Position.from_arrays(
-        photo=list(given), position=np.array(list(given.values())), sd=np.array(deviations)
-    )
+    positions = np.array(list(given.values()))
+    return Position.from_arrays(photo=list(given), position=positions, sd=np.array(deviations))
 
 
 def _frame(model: Tree) -> Frame:
@@ -168,8 +165,8 @@ def _frame(model: Tree) -> Frame:
 def _tracks(
     path: Path, names: list[str], points: list[str], messages: list[Message]
 ) -> tuple[Indices, Indices, Floats]:
-    """Return photo, point and (m, 2) normalised coordinates of observations."""
-    lines = read_lines(path)
+    """Return photo, point and (m, 2) normalised coordinates of observations; none without a file."""
+    lines = read_lines(path) if path.is_file() else []
     width = _VERSIONS.get(lines[0].strip(), 0) if lines else 0
     if lines and not width and lines[0].startswith("OPENSFM_TRACKS_VERSION"):
         one_word(Place(path, 1, lines[0]), "version", lines[0], _VERSIONS)
@@ -191,7 +188,7 @@ def _tracks(
             continue
         try:
             xy.append((finite_number(cells[3]), finite_number(cells[4])))
-        except ValueError as error:
+        except InputError as error:
             raise Place(path, record, line).error(message_of(error)) from None
         photos.append(photo)
         tracks.append(point)
@@ -224,29 +221,17 @@ def write(project: Project) -> Mapping[str, bytes]:
     shots: dict[str, Any] = {}
     for row, rotation, translation in zip(rows.tolist(), rotations, translations, strict=True):
         name = block.photo_ids[row]
-        shots[name] = {
-            "rotation": rotation,
-            "translation": translation,
-            "camera": cameras[which[row]].name,
-            "orientation": 1,
-        }
+        shots[name] = {"rotation": rotation, "translation": translation}
+        shots[name] |= {"camera": cameras[which[row]].name, "orientation": 1}
         if name in gps:
             shots[name]["gps_position"] = gps[name].observed[:3].tolist()
             shots[name]["gps_dop"] = float(np.sqrt(np.trace(gps[name].precision) / 3))
-    positions = complete_positions(project)
-    placed = np.isfinite(positions).all(axis=1)
-    colours = project.details.get("colours", {})
-    model: dict[str, Any] = {
-        "cameras": {each.name: _camera_member(each, size) for each, size in zip(cameras, sizes, strict=True)},
-        "shots": shots,
-        "points": {
-            block.point_ids[row]: {
-                "color": list(map(float, colours.get(block.point_ids[row], (0, 0, 0)))),
-                "coordinates": positions[row].tolist(),
-            }
-            for row in np.flatnonzero(placed).tolist()
-        },
-    }
+    positions, colours, points = complete_positions(project), project.details.get("colours", {}), {}
+    for row in np.flatnonzero(np.isfinite(positions).all(axis=1)).tolist():
+        colour = list(map(float, colours.get(name := block.point_ids[row], (0, 0, 0))))
+        points[name] = {"color": colour, "coordinates": positions[row].tolist()}
+    members = {each.name: _camera_member(each, size) for each, size in zip(cameras, sizes, strict=True)}
+    model: dict[str, Any] = {"cameras": members, "shots": shots, "points": points}
     frame = project.frame
     if frame.kind == "topocentric" and frame.origin is not None:
         names = ("latitude", "longitude", "altitude")
@@ -265,8 +250,6 @@ def _control(project: Project) -> bytes:
     own = np.flatnonzero(np.isfinite(known.positions).all(axis=1)).tolist()
     if not own or project.frame.kind != "topocentric" or project.frame.origin is None:
         return b""
-    from photogram.formats.crs import GEOGRAPHIC, from_frame
-
     found, _ = from_frame(GEOGRAPHIC, known.positions[own], np.zeros((len(own), 3, 3)), project.frame)
     places = {project.block.point_ids[known.rows[k]]: xyz for k, xyz in zip(own, found.tolist(), strict=True)}
     lines = ["WGS84"]

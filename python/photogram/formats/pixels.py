@@ -19,13 +19,14 @@ from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.photos import cameras_of
 from photogram.formats.plain.schema import column_units
 from photogram.formats.plain.settings import Settings
-from photogram.formats.plain.tables import Tables
+from photogram.formats.plain.tables import Tables, check_rows, columns_of
 from photogram.formats.plain.writing import camera_table
 from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
 from photogram.io.csv_text import csv_text
 from photogram.io.delimited import read_columns, read_head
+from photogram.io.places import positive
 from photogram.messages import Message
 from photogram.words import Phrase, phrase
 
@@ -50,7 +51,6 @@ def corner_of(table: ColumnTable, pixel_origin: str | None) -> Floats:
 
 
 def has_pixels(path: Path) -> bool:
-    """Return whether the header of a table has the columns of photos, points and pixels."""
     spelling = partial(PLAIN.spelled, _KNOWN)
     try:
         return set(_NEEDED) <= set(spelling(read_head(path, _NEEDED, spelling)))
@@ -72,16 +72,14 @@ def read(path: Path, options: ReadOptions) -> Project:
     which = np.array(cameras_of(table, [each.name for each in block.cameras]), dtype=np.int64)
     of_photo = np.zeros(len(photos.names), dtype=np.int64)
     of_photo[photos.rows] = which
-    other = np.flatnonzero(of_photo[photos.rows] != which)
-    if len(other):
-        raise table.error(int(other[0]), phrase("pixels.camera"))
+    check_rows(table, of_photo[photos.rows] != which, phrase("pixels.camera"))
     corner = corner_of(table, options.pixel_origin)
     if options.pixel_origin != "center" and (corner < 0).any() and (corner >= -0.5).all():
-        messages.append(Message(phrase("pixels.origin")))
+        messages.append(Message.of("pixels.origin"))
     xy = by_camera(corner, which, lambda row, own: from_corner(block.cameras[row], block.sizes[row], own))
     keep = table.flags("use")
     if not keep.all():
-        messages.append(Message(phrase("pixels.unused", n=int(np.count_nonzero(~keep))), path))
+        messages.append(Message.of("pixels.unused", path, n=int(np.count_nonzero(~keep))))
     sd = _sd(table, options)
     block.photos(photos.names, of_photo)
     block.points(points.names)
@@ -97,10 +95,8 @@ def _sd(table: ColumnTable, options: ReadOptions) -> Floats | None:
     common = table.numbers("sd", default)
     found = table.vectors(("sd_column", "sd_row"))
     found = np.where(np.isnan(found), common[:, np.newaxis], found)
-    bad = np.flatnonzero(~(found > 0).all(axis=1))
-    if len(bad):
-        value = float(found[bad[0]].min())
-        raise table.error(int(bad[0]), phrase("format.positive", name="the standard deviation", value=value))
+    for row in np.flatnonzero(~(found > 0).all(axis=1))[:1].tolist():
+        positive(table.at(row), "the standard deviation", float(found[row].min()))
     return found
 
 
@@ -108,16 +104,13 @@ def write(project: Project) -> Mapping[str, bytes]:
     """Return the table of observations, and the table of cameras."""
     block = project.block
     cameras, which = known_cameras(block)
-    names = np.array([cameras[row].name for row in which], dtype=object)
-    photos, points = np.array(block.photo_ids, dtype=object), np.array(block.point_ids, dtype=object)
-    corner = to_corner(project)
+    owners = [cameras[row].name for row in which]
+    photos, names = np.array(block.photo_ids, dtype=object), np.array(owners, dtype=object)
     columns = {
         "photo": photos[block.image_photos],
-        "point": points[block.image_points],
-        "column": corner[:, 0],
-        "row": corner[:, 1],
-        "sd_column": block.image_sd[:, 0],
-        "sd_row": block.image_sd[:, 1],
+        "point": np.array(block.point_ids, dtype=object)[block.image_points],
+        **columns_of(("column", "row"), to_corner(project)),
+        **columns_of(("sd_column", "sd_row"), block.image_sd),
         "camera": names[block.image_photos],
     }
     return {
@@ -127,5 +120,4 @@ def write(project: Project) -> Mapping[str, bytes]:
 
 
 def cannot_hold(_: Project) -> list[Phrase]:
-    """Return that all but the observations and cameras is lost."""
     return [phrase("lost.all-but-images")]

@@ -141,6 +141,5 @@ class Project(Brief):
 
     def positions(self) -> Floats:
         """Return (n, 3) positions of control and check points, else from the file."""
-        return np.asarray(
-            np.where(np.isnan(self.block.point_positions), self.starts, self.block.point_positions)
-        )
+        known = self.block.point_positions
+        return np.where(np.isnan(known), self.starts, known)

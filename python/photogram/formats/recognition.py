@@ -41,7 +41,6 @@ def opensfm(path: Path) -> Path | None:
 
 
 def blocks_exchange(path: Path) -> bool:
-    """Return whether the root element of a file is BlocksExchange."""
     return path.is_file() and root_of(path)[0] == "BlocksExchange"
 
 
@@ -52,7 +51,6 @@ def agisoft(path: Path) -> bool:
 
 
 def bundle_of(path: Path) -> Path:
-    """Return the Bundle file of a folder, or the file."""
     return path / FORMATS["bundler"].files[0] if path.is_dir() else path
 
 
@@ -65,17 +63,14 @@ def _begin(path: Path) -> bytes:
 
 
 def bundler(path: Path) -> bool:
-    """Return whether a file begins as a Bundle file."""
     return _begin(bundle_of(path)).startswith(b"# Bundle file")
 
 
 def bal(path: Path) -> bool:
-    """Return whether a file begins as a problem."""
     return _FIRST_OF_BAL.match(_begin(path)[:1000]) is not None
 
 
 def pixels(path: Path) -> bool:
-    """Return whether a table has columns of photos, points and pixels."""
     if not path.is_file() or path.suffix.lower() not in (".csv", ".tsv", ".txt"):
         return False
     from photogram.formats.pixels import has_pixels
@@ -105,7 +100,6 @@ def giant(path: Path) -> bool:
 
 
 def isis(path: Path) -> bool:
-    """Return whether a file begins as a control network."""
     if not path.is_file():
         return False
     from photogram.formats.isis.network import is_network
@@ -115,7 +109,6 @@ def isis(path: Path) -> bool:
 
 
 def targets(path: Path) -> bool:
-    """Return whether files contain corners of a board."""
     if (path / "project.toml").exists():
         return False
     from photogram.targets.corner_files import holds_targets
@@ -124,7 +117,6 @@ def targets(path: Path) -> bool:
 
 
 def results(path: Path) -> bool:
-    """Return whether a folder contains a result."""
     from photogram.results.result_files import SUMMARY
 
     return path.is_dir() and (path / SUMMARY).is_file() and (path / "state.parquet").is_file()

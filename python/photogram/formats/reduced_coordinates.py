@@ -7,14 +7,15 @@ PATB has an image file in micrometres, an orientation with matrices, and control
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import zip_longest
 from pathlib import Path
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats, Indices
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
-from photogram.formats.cards import END, Card, cards, one_file
+from photogram.formats.cards import END, Card, cards, file_of, one_file
 from photogram.formats.description import agreement
 from photogram.formats.format import FORMATS
 from photogram.formats.images import checked_rotation
@@ -29,7 +30,6 @@ from photogram.formats.read_options import ReadOptions
 from photogram.io.csv_text import csv_text
 from photogram.io.numbers import scaled
 from photogram.io.places import Place, one_word
-from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.block_checks import known_poses
@@ -55,9 +55,9 @@ class ReducedBuilder(BlockBuilder):
         super().__init__(path, title)
         self.sd, self.unit_of_angles, self.names = options.sd, options.angles, names or {}
 
-    def name(self, card: Card, index: int = 0) -> str:
-        """Return the name of a word."""
-        return self.names.get(card.words[index], card.words[index])
+    def name(self, card: Card) -> str:
+        """Return the name of the first word."""
+        return self.names.get(card.words[0], card.words[0])
 
     def add_images(self, add: Callable[[str, Card], None], unit: float, *, ends_empty: bool) -> None:
         """Add the photos of the image file, each with the observations up to an end mark or empty line."""
@@ -135,36 +135,27 @@ def with_fitting_rotations(project: Project) -> Project:
 
 def _misfit(project: Project) -> float:
     """Return the median residual of intersections; infinite behind photos."""
-    loose = project.replace(
-        block=project.block.replace(point_positions=np.full_like(project.starts, np.nan), point_sd=np.inf),
-        starts=np.full_like(project.starts, np.nan),
-    )
+    unknown = np.full_like(project.starts, np.nan)
+    block = project.block.replace(point_positions=unknown, point_sd=np.inf)
+    loose = project.replace(block=block, starts=unknown)
     found = agreement(loose.replace(starts=complete_positions(loose)))
-    return found.median if found.images else 0.0
+    return found.median if len(found.xy) else 0.0
 
 
-@dataclass(frozen=True)
-class ReducedImages:
-    """Contents of such files: cameras, image observations and poses."""
-
-    distances: Floats  # Principal distance of each camera, millimetres
-    names: list[str]  # Names of the cameras
-    cameras: Indices  # (P,) camera of each photo
-    rows: Indices  # Observations that a perspective camera can have
-    xy: Floats  # (rows, 2) millimetres from the principal point, y up
-    posed: Bools  # (P,) photos with a pose
-    matrices: Floats  # (P, 3, 3) attitudes A, photo to object
+_Images = list[list[tuple[str, float, float]]]
 
 
-def reduced_images(project: Project, digits: int | None = None) -> ReducedImages:
-    """Return the images reduced to a camera without distortion."""
-    block = project.block
-    cameras, which = known_cameras(block)
-    pixels = [*project.pixel_mm, *(None for _ in cameras[len(project.pixel_mm) :])]
+def reduced_images(project: Project, digits: int | None = None) -> tuple[Floats, _Images]:
+    """Return principal distances of cameras, and names and coordinates of the observations of each photo.
+
+    Coordinates are millimetres from the principal point, y up, of a camera without distortion. Observations
+    that a perspective camera cannot have are omitted.
+    """
+    block, (cameras, which) = project.block, known_cameras(project.block)
     distances = np.array(
         [
             each.scale if each.unit == "mm" else NOMINAL if pixel is None else each.scale * pixel
-            for each, pixel in zip(cameras, pixels, strict=True)
+            for each, pixel in zip_longest(cameras, project.pixel_mm)
         ]
     )
     if digits is not None:
@@ -172,18 +163,13 @@ def reduced_images(project: Project, digits: int | None = None) -> ReducedImages
     directions = image_directions(block)
     with np.errstate(invalid="ignore"):
         rows = np.flatnonzero(directions[:, 2] < SIDE)
-    of_photos = np.asarray(which, dtype=np.int64)
-    own = directions[rows]
-    scales = distances[of_photos[block.image_photos[rows]], np.newaxis]
-    return ReducedImages(
-        distances,
-        [each.name for each in cameras],
-        of_photos,
-        rows,
-        scales * own[:, :2] / -own[:, 2:],
-        known_poses(block),
-        attitude_matrices(block),
-    )
+    photos, rays = block.image_photos[rows], directions[rows]
+    xy = distances[np.asarray(which, dtype=np.int64)[photos], np.newaxis] * rays[:, :2] / -rays[:, 2:]
+    images: _Images = [[] for _ in block.photo_ids]
+    points = block.image_points[rows]
+    for photo, point, (x, y) in zip(photos.tolist(), points.tolist(), xy.tolist(), strict=True):
+        images[photo].append((block.point_ids[point], x, y))
+    return distances, images
 
 
 def given_control(project: Project) -> dict[str, tuple[Floats, Bools]]:
@@ -194,24 +180,12 @@ def given_control(project: Project) -> dict[str, tuple[Floats, Bools]]:
     return dict(zip(names, zip(known.positions, held, strict=True), strict=True))
 
 
-def lost_of_reduced(project: Project, reduced: ReducedImages) -> list[Phrase]:
-    """Return images and principal distances that files of reduced coordinates cannot contain."""
+def lost_of_reduced(project: Project) -> list[Phrase]:
     found = []
     if any(camera.unit == "px" for camera in known_cameras(project.block)[0]) and None in project.pixel_mm:
         found.append(phrase("lost.nominal-distance", distance=NOMINAL))
-    if lost := len(project.block.image_xy) - len(reduced.rows):
+    if lost := len(project.block.image_xy) - sum(map(len, reduced_images(project)[1])):
         found.append(phrase("lost.images", n=lost))
-    return found
-
-
-def by_photo(project: Project, reduced: ReducedImages) -> Sequence[list[tuple[str, float, float]]]:
-    """Return names and coordinates of the observations of each photo."""
-    block = project.block
-    found: list[list[tuple[str, float, float]]] = [[] for _ in block.photo_ids]
-    photos = block.image_photos[reduced.rows].tolist()
-    points = block.image_points[reduced.rows].tolist()
-    for photo, point, (x, y) in zip(photos, points, reduced.xy.tolist(), strict=True):
-        found[photo].append((block.point_ids[point], x, y))
     return found
 
 
@@ -222,10 +196,8 @@ DIGITS = 6  # Digits of principal distances in millimetres; files have three of 
 
 def read_patb(path: Path, options: ReadOptions) -> Project:
     """Read the image file, and orientation, control and names if present."""
-    folder = path if path.is_dir() else path.parent
-    images = path if path.is_file() else one_file(folder, IMAGES)
-    if images is None:
-        raise InputError(phrase("format.files", name=f"*{IMAGES}"), file=path)
+    images = file_of(path, IMAGES)
+    folder = images.parent
     block = ReducedBuilder(images, FORMATS["patb"].title, options, read_names(folder / NAMES))
 
     def add(photo: str, card: Card) -> None:
@@ -265,8 +237,7 @@ def _filled(path: Path) -> Sequence[Card]:
 
 
 def lost_in_patb(project: Project) -> list[Phrase]:
-    """Return parts of a project that the files of PATB cannot contain."""
-    found = [*lost_of_reduced(project, reduced_images(project, DIGITS)), phrase("lost.patb-digits")]
+    found = [*lost_of_reduced(project), phrase("lost.patb-digits")]
     if any((held[0] != held[1]) for _, held in given_control(project).values()):
         found.append(phrase("lost.horizontal-control"))
     return found
@@ -274,20 +245,19 @@ def lost_in_patb(project: Project) -> list[Phrase]:
 
 def write_patb(project: Project) -> Mapping[str, bytes]:
     """Return image file, orientation, control, and names if they are not numbers."""
-    block, reduced = project.block, reduced_images(project, DIGITS)
+    block, (distances, observed) = project.block, reduced_images(project, DIGITS)
     numbers = numbered([*block.photo_ids, *block.point_ids])
     images: list[str] = []
-    distances = reduced.distances[reduced.cameras]
-    for photo, c, own in zip(block.photo_ids, distances, by_photo(project, reduced), strict=True):
-        images.append(f"{numbers[photo]:12d}{c / MICROMETRES:15.3f}")
+    for photo, row, own in zip(block.photo_ids, known_cameras(block)[1], observed, strict=True):
+        images.append(f"{numbers[photo]:12d}{distances[row] / MICROMETRES:15.3f}")
         images += [
             f"{numbers[point]:12d}{x / MICROMETRES:16.4f}{y / MICROMETRES:16.4f}    0" for point, x, y in own
         ]
         images.append(f"{END:>12}")
-    oriented: list[str] = []
-    for row in np.flatnonzero(reduced.posed).tolist():
+    oriented, matrices = list[str](), attitude_matrices(block)
+    for row in np.flatnonzero(known_poses(block)).tolist():
         centre = "".join(f"{own:16.5f}" for own in block.photo_positions[row])
-        elements = [f"{own:16.12f}" for own in reduced.matrices[row].ravel()]
+        elements = [f"{own:16.12f}" for own in matrices[row].ravel()]
         oriented.append(f"{numbers[block.photo_ids[row]]:16d}{'':16}{centre}")
         oriented += ["".join(elements[:5]), "".join(elements[5:])]
     files = {f"block{IMAGES}": images, f"block{ORIENTATION}": oriented}
@@ -332,8 +302,7 @@ def read_bingo(path: Path, options: ReadOptions) -> Project:
 
 
 def lost_in_bingo(project: Project) -> list[Phrase]:
-    """Return parts of a project that the files of BINGO cannot contain."""
-    found = lost_of_reduced(project, reduced_images(project))
+    found = lost_of_reduced(project)
     if any(name != word for name, word in _words(project).items()):
         found.append(phrase("lost.blanks"))
     if given_control(project):
@@ -342,7 +311,6 @@ def lost_in_bingo(project: Project) -> list[Phrase]:
 
 
 def _words(project: Project) -> dict[str, str]:
-    """Return names as words of the files."""
     found: dict[str, str] = {}
     cameras = [each.name for each in known_cameras(project.block)[0]]
     for names in (project.block.photo_ids, project.block.point_ids, cameras):
@@ -358,22 +326,23 @@ def _words(project: Project) -> dict[str, str]:
 
 def write_bingo(project: Project) -> Mapping[str, bytes]:
     """Return images, orientation, and tables of cameras and of control."""
-    block, reduced, words = project.block, reduced_images(project), _words(project)
-    lines: list[str] = []
-    owners = [words[reduced.names[row]] for row in reduced.cameras.tolist()]
-    for photo, camera, own in zip(block.photo_ids, owners, by_photo(project, reduced), strict=True):
+    block, (cameras, which), words = project.block, known_cameras(project.block), _words(project)
+    distances, observed = reduced_images(project)
+    lines, names = list[str](), [words[each.name] for each in cameras]
+    owners = [names[row] for row in which]
+    for photo, camera, own in zip(block.photo_ids, owners, observed, strict=True):
         lines.append(f"{words[photo]} {camera}")
         lines += [f"{words[point]} {x!r} {y!r}" for point, x, y in own]
         lines.append(END)
     files = {IMAGE_DAT: ("\n".join(lines) + "\n").encode()}
-    if len(rows := np.flatnonzero(reduced.posed)):
-        angles = Attitudes(reduced.matrices[rows]).values("omega_phi_kappa") * (200 / np.pi)
+    if len(rows := np.flatnonzero(known_poses(block))):
+        angles = Attitudes(attitude_matrices(block)[rows]).values("omega_phi_kappa") * (200 / np.pi)
         lines = []
         for row, own in zip(rows.tolist(), angles.tolist(), strict=True):
             numbers = " ".join(map(repr, [*block.photo_positions[row].tolist(), *own]))
             lines.append(f"ORIA {words[block.photo_ids[row]]} {owners[row]} {numbers}\n")
         files[ORIENTATION_DAT] = "".join(lines).encode()
-    files[CAMERAS] = csv_text({"camera": [words[name] for name in reduced.names], "c": reduced.distances})
+    files[CAMERAS] = csv_text({"camera": names, "c": distances})
     if table := control_table(project):
         files["control.csv"] = csv_text({**table, "point": [words[name] for name in table["point"]]})
     return files

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from photogram.arguments.fields import options_of
-from photogram.errors import InputError, PhotogramError, message_of
+from photogram.errors import InputError, PhotogramError
 from photogram.formats.crs import plane_remarks
 from photogram.formats.format import FORMATS, FORMATS_OF_CAMERAS, Format
 from photogram.formats.models import (
@@ -24,6 +24,7 @@ from photogram.formats.project import Project
 from photogram.formats.read_options import ReadOptions
 from photogram.formats.xml_stream import SUFFIXES, read_stream, root_of
 from photogram.io.files import reading
+from photogram.io.places import Place, at_place, one_word
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import turned
 from photogram.results.result import Result
@@ -47,7 +48,6 @@ def recognised(path: Path) -> Format:
 
 
 def _located(path: Path, file_format: str | None = None) -> tuple[Format, Path]:
-    """Return format and location of a project."""
     among = list(FORMATS.values()) if file_format is None else [_named(file_format)]
     with reading(path):
         path.stat()
@@ -91,7 +91,8 @@ def read(path: Path, options: ReadOptions | None = None, **changes: Any) -> Proj
     path = Path(path)
     options = options_of(ReadOptions, options, changes)
     chosen, path = _located(path, options.file_format)
-    with turned(f"reading {path}"):
+    # Checks of arrays and coordinate systems do not report the file.
+    with turned(f"reading {path}"), at_place(Place(path)):
         try:
             if options.settings and chosen.name != "plain":
                 raise InputError(phrase("format.settings", title=chosen.title))
@@ -104,12 +105,8 @@ def read(path: Path, options: ReadOptions | None = None, **changes: Any) -> Proj
                 from photogram.formats.metadata.adding import with_photo_positions
 
                 project = with_photo_positions(project, options)
-            project = project.replace(
-                messages=(*project.messages, *plane_remarks(project.block, path, project.starts))
-            )
-        except InputError as error:
-            # Checks of arrays and coordinate systems do not report the file.
-            raise (error if error.file else InputError(message_of(error), file=path)) from None
+            planes = plane_remarks(project.block, path, project.starts)
+            project = project.replace(messages=(*project.messages, *planes))
         except PhotogramError:
             raise
         except (ArithmeticError, LookupError, ValueError) as error:
@@ -140,7 +137,6 @@ def to_files(project: Project, file_format: str) -> Mapping[str, bytes]:
 
 
 def _fitting(project: Project, chosen: Format) -> Project:
-    """Return a project in the object and image coordinates of a format."""
     project = project if chosen.geographic else in_topocentric(project)
     return in_pixels(project) if chosen.pixels else project
 
@@ -220,13 +216,11 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
     found += [] if chosen.holds is None else lost(fitting, chosen.holds)
     found += chosen.cannot_hold(fitting)
     if chosen.name != "plain":
+        moments = sum(each.moment is not None for each in project.block.observations)
+        counts = (len(project.features), len(project.block.timed), moments)
         found += parts_of_asked(project.statement)
-        counts = {
-            "features": len(project.features),
-            "trajectories": len(project.block.timed),
-            "moments": sum(each.moment is not None for each in project.block.observations),
-        }
-        found += [phrase(f"lost.{part}", n=n) for part, n in counts.items() if n]
+        parts = zip(("features", "trajectories", "moments"), counts, strict=True)
+        found += [phrase(f"lost.{part}", n=n) for part, n in parts if n]
     return [str(part) for part in [*found, *(nominal_pixels(project) if chosen.pixels else [])]]
 
 
@@ -249,6 +243,4 @@ def adjusting(project: Project, adjust: Callable[..., Result]) -> Callable[..., 
 
 
 def _named(file_format: str, among: Mapping[str, Format] = FORMATS) -> Format:
-    if file_format not in among:
-        raise InputError(phrase("format.unknown", what="format", value=file_format, names=list(among)))
-    return among[file_format]
+    return among[one_word(Place(), "format", file_format, among)]

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
 
@@ -14,11 +14,12 @@ from photogram.arguments.arrays import natural_order
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.crs import axes_of, has_place, is_on, to_system, turned_covariances
+from photogram.formats.crs import axes_of, has_place, in_degrees, is_on, to_system, turned_covariances
 from photogram.formats.format import FORMATS
 from photogram.formats.project import Project, frame_of
 from photogram.formats.read_options import ReadOptions
 from photogram.io.csv_text import csv_text
+from photogram.io.places import Place, one_word
 from photogram.io.sheets import workbook
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.attitudes import Attitudes, angles_form
@@ -69,12 +70,7 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
     }
     folder = path_of("directory", directory)
     document = read_summary(folder)
-    kind = document["kind"]
-    if kind not in readers:
-        raise InputError(
-            phrase("format.unknown", what="kind of the result", value=str(kind), names=list(readers)),
-            file=folder / SUMMARY,
-        )
+    kind = one_word(Place(folder / SUMMARY), "kind of the result", str(document["kind"]), readers)
     try:
         return readers[kind](folder, document)
     except InputError:
@@ -85,12 +81,10 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
 
 def read_project(path: Path, options: ReadOptions) -> Project:
     """Read the adjusted block of a result, with its adjustment settings."""
-    del options
     result = read_result(path)
     if not isinstance(result, Result):
         raise InputError(phrase("results.collection"), file=path)
     datums: dict[str, DatumName] = {"inner constraints": "inner", "minimum constraints": "minimum"}
-    losses: dict[str, Literal["huber", "cauchy"]] = {"huber": "huber", "cauchy": "cauchy"}
     variances: dict[str, Literal["unity", "redundancy"]] = {"unity": "unity", "redundancy": "redundancy"}
     return Project(
         block=result.restarted(),
@@ -100,19 +94,14 @@ def read_project(path: Path, options: ReadOptions) -> Project:
         frame=result.block.frame,
         options=AdjustOptions(
             datum=datums.get(result.datum.kind),
-            loss=None if result.loss is None else losses[result.loss[0]],
+            loss=None if result.loss is None else cast("Any", result.loss[0]),
             unit_variance=variances.get(result.unit_variance, "constrained"),
         ),
         features={} if result.features is None else result.features.definitions,
     )
 
 
-_TABLES = {"photos": "photo", "points": "point", "images": "image", **TABLE_FILES}
-"""File and kind of each table."""
-
-
 def adjusted(project: Project, result: Result) -> Project:
-    """Return a project with adjusted parameters; observations are unchanged."""
     starts = np.where(np.isfinite(result.point_positions), result.point_positions, project.starts)
     return project.replace(block=result.restarted(), starts=starts, lacks=())
 
@@ -139,14 +128,18 @@ def project_files(project: Project, result: Result) -> tuple[dict[str, bytes], l
     return files, remarks
 
 
+def _filled_tables(result: Result) -> Iterator[tuple[str, dict[str, Any], list[str]]]:
+    """Yield name, columns and comments on units of tables with rows."""
+    for name, kind in {"photos": "photo", "points": "point", "images": "image", **TABLE_FILES}.items():
+        columns = frame(table := TABLES[kind](result))
+        if len(next(iter(columns.values()))):
+            yield name, columns, unit_comments(table)
+
+
 def table_files(result: Result) -> Mapping[str, bytes]:
     """Return the tables of a result as CSV by file name, without empty tables."""
-    files = {}
-    for file, kind in _TABLES.items():
-        table = TABLES[kind](result)
-        columns = frame(table)
-        if len(next(iter(columns.values()))):
-            files[f"{file}.csv"] = csv_text(columns, unit_comments(table))
+    tables = _filled_tables(result)
+    files = {f"{name}.csv": csv_text(columns, comments) for name, columns, comments in tables}
     if result.films:
         # Film observations in the camera frame, for programs without film models.
         (xy, sd), block = result.refined, result.block
@@ -154,8 +147,7 @@ def table_files(result: Result) -> Mapping[str, bytes]:
         columns = {
             "photo": [block.photo_ids[row] for row in block.image_photos[known].tolist()],
             "point": [block.point_ids[row] for row in block.image_points[known].tolist()],
-            **dict(zip(("x", "y"), xy[known].T, strict=True)),
-            **dict(zip(("sd_x", "sd_y"), sd[known].T, strict=True)),
+            **dict(zip(("x", "y", "sd_x", "sd_y"), np.hstack([xy, sd])[known].T, strict=True)),
         }
         comments = [
             "mm in the frame of the marks, x right and y up on the positive; the lens is not taken out",
@@ -164,51 +156,34 @@ def table_files(result: Result) -> Mapping[str, bytes]:
         files["refined.csv"] = csv_text(columns, comments)
     if np.isfinite(result.photo_cofactors).any():
         names = ("x", "y", "z", "omega", "phi", "kappa")
-        files["photo_covariances.csv"] = _packed(
-            "photo", result.block.photo_ids, result.photo_covariances, names, result
-        )
-        used = [name for name, there in zip(result.block.point_ids, result.used_points, strict=True) if there]
-        files["point_covariances.csv"] = _packed(
-            "point", used, result.point_covariances[result.used_points], names[:3], result
-        )
+        points = np.array(result.block.point_ids, dtype=object)[result.used_points]
+        for kind, ids, covariances, own in (
+            ("photo", result.block.photo_ids, result.photo_covariances, names),
+            ("point", points, result.point_covariances[result.used_points], names[:3]),
+        ):
+            # Lower triangles row by row, one matrix per line
+            pairs = [(i, j) for i in range(len(own)) for j in range(i + 1)]
+            packed = {f"c_{own[i]}_{own[j]}": covariances[:, i, j] for i, j in pairs}
+            scale, unit = result.covariance_scale, result.block.linear_unit
+            comments = [
+                f"covariances, scaled by the variance of unit weight {scale!r}; datum: {result.datum}",
+                f"units: {unit} for x, y, z" + ", rad for omega, phi, kappa" * (kind == "photo"),
+            ]
+            files[f"{kind}_covariances.csv"] = csv_text({kind: ids, **packed}, comments)
     return files
 
 
 def feature_files(features: Features) -> Mapping[str, bytes]:
-    """Return the tables of features as CSV by file name."""
-    tables = {
-        "features.csv": frame(quantity_columns(features)),
-        "feature_deviations.csv": frame(deviation_quantities(features)),
-    }
+    quantities = {"features.csv": quantity_columns, "feature_deviations.csv": deviation_quantities}
+    tables = {name: frame(columns(features)) for name, columns in quantities.items()}
     return {name: csv_text(columns) for name, columns in tables.items() if columns["feature"]}
 
 
 def excel_file(result: Result) -> bytes:
     """Return the tables of a result as a workbook, with units in `notes`."""
-    tables = {file: TABLES[kind](result) for file, kind in _TABLES.items()}
-    sheets = {file: frame(table) for file, table in tables.items()}
-    filled = {file: columns for file, columns in sheets.items() if len(next(iter(columns.values())))}
-    notes = {file: "; ".join(unit_comments(tables[file])) for file in filled}
-    return workbook(filled, {file: note for file, note in notes.items() if note})
-
-
-def _packed(
-    kind: str, names: list[str], covariances: Floats, order: tuple[str, ...], result: Result
-) -> bytes:
-    """Return lower triangles row by row, one matrix per line."""
-    pairs = [(i, j) for i in range(len(order)) for j in range(i + 1)]
-    columns: dict[str, Any] = {kind: names}
-    columns |= {f"c_{order[i]}_{order[j]}": covariances[:, i, j] for i, j in pairs}
-    unit = result.block.linear_unit
-    return csv_text(
-        columns,
-        [
-            f"covariances, scaled by the variance of unit weight {result.covariance_scale!r};"
-            f" datum: {result.datum}",
-            f"units: {unit} for {', '.join(order[:3])}"
-            + ("" if len(order) == 3 else f", rad for {', '.join(order[3:])}"),
-        ],
-    )
+    tables = list(_filled_tables(result))
+    notes = {name: "; ".join(comments) for name, _, comments in tables if comments}
+    return workbook({name: columns for name, columns, _ in tables}, notes)
 
 
 _ANGLES = ("omega", "phi", "kappa")
@@ -354,10 +329,7 @@ def placed(result: Result, crs: str = "") -> Placed:
         names, units = axes_of(crs)
     elif block.geographic:
         names, units = ("longitude", "latitude", "height"), ("deg", "deg", block.linear_unit)
-    turned = [
-        turned_covariances(turns, own)
-        for turns, own in zip((photo_turns, point_turns), covariances, strict=True)
-    ]
+    turned = list(map(turned_covariances, (photo_turns, point_turns), covariances))
     attitude_covariances = result.photo_covariances[:, 3:, 3:]
     known = attitude_covariances if np.isfinite(attitude_covariances).all() else None
     own = Attitudes.of(angles_form(block.photo_to_ground), result.photo_attitudes, known)
@@ -378,7 +350,6 @@ def placed(result: Result, crs: str = "") -> Placed:
 
 
 def placed_files(found: Placed) -> dict[str, bytes]:
-    """Return CSV tables of a result in a system."""
     ids = np.array(found.result.block.point_ids, dtype=object)
     degrees = tuple(Axis(name, "deg", suffix="_deg") for name in _ANGLES)
     angles = zip(("", "sd"), map(np.degrees, found.angles()), strict=True)
@@ -390,10 +361,8 @@ def placed_files(found: Placed) -> dict[str, bytes]:
         ],
         "points.csv": _points(found),
     }
-    for name, (rows, vectors) in (
-        ("control.csv", found.control_differences()),
-        ("check_points.csv", found.differences()),
-    ):
+    differences = {"control.csv": found.control_differences(), "check_points.csv": found.differences()}
+    for name, (rows, vectors) in differences.items():
         if len(rows):
             tables[name] = [column("point", ids[rows]), Quantity(vectors, _METRES, "deviation", "d")]
     comments = [
@@ -410,14 +379,13 @@ def _carried(block: Block, crs: str, frame: Frame, xyz: Floats) -> tuple[Floats,
     """Return positions in a system, and rotations of vectors."""
     if crs:
         return to_system(crs, xyz, frame)
-    degrees = np.column_stack([np.degrees(xyz[:, :2]), xyz[:, 2]]) if block.geographic else xyz
-    return degrees, np.broadcast_to(np.eye(3), (len(xyz), 3, 3))
+    return in_degrees(xyz, block.geographic), np.broadcast_to(np.eye(3), (len(xyz), 3, 3))
 
 
 def _points(found: Placed) -> list[Quantity]:
-    result = found.result
+    result, ids = found.result, np.array(found.result.block.point_ids, dtype=object)
     return [
-        column("point", np.array(result.block.point_ids, dtype=object)[found.rows], "Point", kind="name"),
+        column("point", ids[found.rows], "Point", kind="name"),
         column("kind", result.point_kinds[found.rows], "Kind", kind="name"),
         column("rays", result.point_rays[found.rows]),
         *_positions(found, found.points, found.point_covariances),
@@ -425,7 +393,6 @@ def _points(found: Placed) -> list[Quantity]:
 
 
 def _positions(found: Placed, xyz: Floats, covariances: Floats) -> list[Quantity]:
-    """Return positions with their standard deviations and covariances."""
     sd = np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
     decimals = decimals_of(sd)
     pairs = [(i, j) for i in range(3) for j in range(i + 1)]
@@ -465,8 +432,7 @@ def placed_section(found: Placed) -> Section:
     decimals = named(columns, "sd").decimals
     steps = np.array([differences[row] for row in rows.tolist()])
     columns.append(Quantity(steps, _METRES, "deviation", head="d {}", decimals=decimals))
-    note = "d: adjusted minus given. Tables of all photos and points are in `in_crs`" + (
-        f"; {len(own) - MOST} more there." if len(own) > MOST else "."
-    )
+    more = f"; {len(own) - MOST} more there." if len(own) > MOST else "."
+    note = f"d: adjusted minus given. Tables of all photos and points are in `in_crs`{more}"
     title = f"Control and check points in {found.crs}"
     return Section("in-crs", title, [Table("", title, columns, note)] if own else [])

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns
+from photogram.formats.control import ControlList, check_systems, read_control_list
 from photogram.formats.crs import plane_remarks
 from photogram.formats.images import by_camera, from_corner, to_corner
 from photogram.formats.models import carried, intersected, is_free
@@ -39,9 +39,6 @@ from photogram.network.wider_models import (
 )
 from photogram.results.result import Result
 from photogram.words import OPTIONS_OF_CONTROL, Phrase, option_sd, phrase
-
-if TYPE_CHECKING:
-    from photogram.formats.control import ControlList
 
 SAME = 1e-3  # Largest difference (pixels) of equal observations of a point in a photo
 SIMILAR = 10.0  # Smallest improvement of the fit of control for which a similarity is applied to the model
@@ -95,11 +92,10 @@ def with_repeated(project: Project) -> Project:
     np.add.at(mean, place, others)
     mean /= count
     sd = block.image_sd[rows]
-    spread = (((own - mean) / sd) ** 2).sum() + (((others - mean[place]) / sd[place]) ** 2).sum()
+    spread = float((((own - mean) / sd) ** 2).sum() + (((others - mean[place]) / sd[place]) ** 2).sum())
     xy, deviations = block.image_xy.copy(), np.array(block.image_sd)
     xy[rows], deviations[rows] = mean, sd / np.sqrt(count)
     said = [each for each in project.messages if each.code != "read.repeated"]
-    spread = float(spread)
     said.append(Message.of("read.averaged", n=len(second), spread=spread, half=spread / 2))
     block = block.replace(image_xy=xy, image_sd=deviations)
     return project.replace(block=block, messages=tuple(said), repeated=Repeated())
@@ -118,24 +114,14 @@ def repeated_remarks(project: Project, result: Result) -> list[Message]:
     first, second = first[used], second[used]
     residuals = project.repeated.xy[second] - block.image_xy[first] + result.residuals[first]
     more = float(((residuals / block.image_sd[first]) ** 2).sum())
-    total = result.sums_of_squares.total
-    return [
-        Message.of(
-            "result.repeated",
-            n=len(first),
-            more=total + more,
-            total=float(total),
-            option=Phrase("option.repeated"),
-        )
-    ]
+    total, option = float(result.sums_of_squares.total), Phrase("option.repeated")
+    return [Message.of("result.repeated", n=len(first), more=total + more, total=total, option=option)]
 
 
 def _repeated_rows(project: Project) -> tuple[Indices, Indices]:
     """Return rows of first observations in the block, and of their repetitions."""
     block, again = project.block, project.repeated
-    if not again.points:
-        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
-    place = _image_rows(block)
+    place = _image_rows(block) if again.points else {}
     pairs = [place.get(pair, -1) for pair in zip(again.photos, again.points, strict=True)]
     rows = np.array(pairs, dtype=np.int64)
     there = np.flatnonzero(rows >= 0)
@@ -143,7 +129,6 @@ def _repeated_rows(project: Project) -> tuple[Indices, Indices]:
 
 
 def _image_rows(block: Block) -> dict[tuple[str, str], int]:
-    """Return the row of each image observation by photo name and point name."""
     ids = zip(block.image_photos.tolist(), block.image_points.tolist(), strict=True)
     return {(block.photo_ids[i], block.point_ids[j]): row for row, (i, j) in enumerate(ids)}
 
@@ -161,31 +146,26 @@ def self_calibrated(project: Project, names: Sequence[str]) -> Project:
     wanted = {name.lower() for name in names}
     cameras, used, messages = [], set(), []
     titles_by_text: dict[str, list[str]] = {}
-    sizes = dict(enumerate(project.sizes))
-    for row, camera in enumerate(project.block.cameras):
+    for camera, size in zip(project.block.cameras, project.sizes, strict=True):
         model = with_parameters(camera, wanted)
         free = set(model.names) - model.constants
         unknown = freed(model, {name.lower() for name in free} if "all" in wanted else wanted)
         cameras.append(unknown)
         if "fx" in free and "f" in wanted and not wanted & {"fx", "fy", "all"}:
-            size = sizes.get(row) if unknown.unit == "px" else None
-            cameras[-1] = with_one_focal_length(unknown, size)
+            cameras[-1] = with_one_focal_length(unknown, size if unknown.unit == "px" else None)
             text = focal_length_message(unknown, cameras[-1])
             titles_by_text.setdefault(text, []).append(camera.title)
         used |= {matching_word(name, wanted) for name in free}
         if model.model != camera.model:
             fields = {"camera": camera.title, "model": model.model, "former": camera.model}
-            messages.append(Message(phrase("plain.model-replaced", **fields)))
-    messages += [
-        Message(phrase("plain.focal-length", names=titles, message=text))
-        for text, titles in titles_by_text.items()
-    ]
+            messages.append(Message.of("plain.model-replaced", **fields))
+    for text, titles in titles_by_text.items():
+        messages.append(Message.of("plain.focal-length", names=titles, message=text))
     if missing := sorted(wanted - used - {"all"}):
         names = sorted({name for camera in project.block.cameras for name in camera.names})
         raise InputError(phrase("error.unknown", kind="parameter of a camera", name=missing[0], names=names))
-    return project.replace(
-        block=project.block.replace(cameras=cameras), messages=(*project.messages, *messages)
-    )
+    block = project.block.replace(cameras=cameras)
+    return project.replace(block=block, messages=(*project.messages, *messages))
 
 
 def held_points(project: Project, wanted: Sequence[str]) -> Project:
@@ -221,9 +201,8 @@ def _with_table(project: Project, path: Path, table: ColumnTable, pixel_origin: 
     photos = indices_of(table, "photo", {name: row for row, name in enumerate(block.photo_ids)}, "photo")
     names = table.names("point")
     known = {name: row for row, name in enumerate(block.point_ids)}
-    new = [name for name in names.names if name not in known]
-    known |= {name: len(block.point_ids) + k for k, name in enumerate(new)}
-    points = np.array([known[name] for name in names.names], dtype=np.int64)[names.rows]
+    rows = [known.setdefault(name, len(known)) for name in names.names]
+    new, points = list(known)[len(block.point_ids) :], np.array(rows, dtype=np.int64)[names.rows]
     corner, which = corner_of(table, pixel_origin), block.photo_cameras[photos]
     xy = by_camera(corner, which, lambda row, own: from_corner(block.cameras[row], project.sizes[row], own))
     fill = np.full((len(new), 3), np.nan)
@@ -252,22 +231,19 @@ def _with_list(project: Project, given: ControlList) -> Project:
     exact, plain = set(project.block.photo_ids), dict[str, list[str]]()
     for name in project.block.photo_ids:
         plain.setdefault("_".join(name.split()), []).append(name)
-    photos = [
-        name if name in exact else plain[name][0] if len(plain.get(name, ())) == 1 else ""
-        for name in given.images.texts("photo")
-    ]
+    listed = given.images.texts("photo")
+    only = {name: names[0] for name, names in plain.items() if len(names) == 1}
+    photos = [name if name in exact else only.get(name, "") for name in listed]
     rows = [row for row, name in enumerate(photos) if name]
-    if len(rows) < len(photos):
-        pairs = zip(given.images.texts("photo"), photos, strict=True)
-        lost = sorted({own for own, name in pairs if not name})
-        given.messages.append(Message(phrase("plain.other-photos", names=lost), given.images.path))
+    if lost := sorted({own for own, name in zip(listed, photos, strict=True) if not name}):
+        given.messages.append(Message.of("plain.other-photos", given.images.path, names=lost))
     table = given.images.some(rows).with_texts("photo", [photos[row] for row in rows])
     known, points = _image_rows(project.block), table.texts("point")
     images = dict(enumerate(zip(table.texts("photo"), points, strict=True)))
     present = {row for row, image in images.items() if image in known}
     if present:
-        there, listed = to_corner(project), corner_of(table, None)
-        present = {row for row in present if np.abs(there[known[images[row]]] - listed[row]).max() <= SAME}
+        there, corner = to_corner(project), corner_of(table, None)
+        present = {row for row in present if np.abs(there[known[images[row]]] - corner[row]).max() <= SAME}
     other = project.tracks.intersection(given.control.texts("point")) - {points[row] for row in present}
     if other:
         new = {name: f"track {name}" for name in project.block.point_ids if name in other}
@@ -275,8 +251,8 @@ def _with_list(project: Project, given: ControlList) -> Project:
         for name in new:
             while new[name] in taken:
                 new[name] = f"track {new[name]}"
-        message = phrase("plain.renamed-tracks", n=len(new), names=list(new.values()))
-        given.messages.append(Message(message, table.path))
+        message = Message.of("plain.renamed-tracks", table.path, n=len(new), names=list(new.values()))
+        given.messages.append(message)
         project = with_other_names(project, new)
     further = table.some([row for row in range(table.count) if row not in present])
     return _with_table(project, table.path, further, None)
@@ -289,9 +265,6 @@ def with_control(
     crs: str | None,
     columns: Columns = PLAIN,
 ) -> Project:
-    """Return a project with control and check points of a table."""
-    from photogram.formats.control import check_systems, read_control_list
-
     listed = read_control_list(path, project)
     crs = crs or (listed.crs if listed else "")
     settings = Settings(
@@ -321,12 +294,8 @@ def with_control(
     raw = table.vectors("xyz")
     messages += check_systems(project, settings, table, targets, raw[rows], free=is_free(project))
     held = [row for row in rows if np.isfinite(given.positions[row]).all()]
-    moved = _carried(
-        project,
-        np.array([places[given.names[row]] for row in held], dtype=np.int64),
-        given.positions[held],
-        transform.frame,
-    )
+    points = np.array([places[given.names[row]] for row in held], dtype=np.int64)
+    moved = _carried(project, points, given.positions[held], transform.frame)
     block = moved.block
     positions, deviation = block.point_positions.copy(), block.point_sd.copy()
     positions[targets], deviation[targets] = given.positions[rows], given.sd[rows]
@@ -336,6 +305,9 @@ def with_control(
     full = [each for each in given.observed if each.points[0] in places]
     for each in full:
         positions[places[each.points[0]]] = np.nan
+    # Data given now are not missing any more.
+    is_given = bool(full) or np.isfinite(deviation).any()
+    options = OPTIONS_OF_CONTROL if is_given else ()
     found = moved.replace(
         block=block.replace(
             point_positions=positions,
@@ -346,36 +318,24 @@ def with_control(
         statement=with_cover(project.statement, given.names, given.vegetated.intersection(places)),
         messages=(*messages, *moved.messages[len(project.messages) :]),
         control_crs=settings.crs.get("control", ""),
-        # Data given now are not missing any more.
-        lacks=tuple(
-            each
-            for each in moved.lacks
-            if not (full or np.isfinite(deviation).any())
-            or each.fields.get("option") not in OPTIONS_OF_CONTROL
-        ),
+        lacks=tuple(each for each in moved.lacks if each.fields.get("option") not in options),
     )
-    planes = [
-        each for each in plane_remarks(found.block, found.path, found.starts) if each not in found.messages
-    ]
-    return found.replace(messages=(*found.messages, *planes))
+    planes = plane_remarks(found.block, found.path, found.starts)
+    new = [each for each in planes if each not in found.messages]
+    return found.replace(messages=(*found.messages, *new))
 
 
-def _carried(
-    project: Project, points: np.ndarray[tuple[int], np.dtype[np.int64]], targets: Floats, frame: Frame
-) -> Project:
+def _carried(project: Project, points: Indices, targets: Floats, frame: Frame) -> Project:
     """Transform a free model to control if the fit improves enough."""
-    block = project.block
     model = project.starts[points].copy()
     unknown = np.flatnonzero(~np.isfinite(model).all(axis=1))
     model[unknown] = intersected(project, points[unknown])
     known = np.isfinite(model).all(axis=1)
-    same = replace(project, frame=frame) if frame != project.frame else project
-    if np.count_nonzero(known) < 3 or not is_free(project):
-        return same
-    scale, turn, shift, misfit = similarity(model[known], targets[known])
-    before = float(np.sqrt(np.mean((model[known] - targets[known]) ** 2)))
-    if not (np.isfinite(misfit) and SIMILAR * misfit < before):
-        return same
-    fields = {"n": int(np.count_nonzero(known)), "scale": scale, "misfit": misfit, "before": before}
-    message = Message.of("plain.carried", unit=block.linear_unit, **fields)
-    return carried(project, (scale, turn, shift), frame, message)
+    if np.count_nonzero(known) > 2 and is_free(project):
+        scale, turn, shift, misfit = similarity(model[known], targets[known])
+        before = float(np.sqrt(np.mean((model[known] - targets[known]) ** 2)))
+        if np.isfinite(misfit) and SIMILAR * misfit < before:
+            fields = {"n": int(np.count_nonzero(known)), "scale": scale, "misfit": misfit, "before": before}
+            message = Message.of("plain.carried", unit=project.block.linear_unit, **fields)
+            return carried(project, (scale, turn, shift), frame, message)
+    return replace(project, frame=frame) if frame != project.frame else project

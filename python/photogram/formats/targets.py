@@ -69,11 +69,7 @@ def project_of(calibration: Calibration, path: Path | None = None) -> Project:
             xy=corners.xy[left] + MIDDLE,
             sd=np.column_stack([left_sd, left_sd]),
         ),
-        details={
-            ASSUMED: calibration.sd0 is None,
-            REGULARISED: calibration.regularise,
-            TIMES: times,
-        },
+        details={ASSUMED: calibration.sd0 is None, REGULARISED: calibration.regularise, TIMES: times},
     )
 
 
@@ -213,12 +209,11 @@ def tied_photos(block: Block) -> list[tuple[str, str, Sensor]]:
 
 def _numbers_of(project: Project, board: Board) -> Indices:
     """Return (n,) the board point of each point of the block."""
-    names = project.block.point_ids if board.kind == "points" else board.names
-    known = {name: k for k, name in enumerate(names)}
-    strange = [name for name in project.block.point_ids if name not in known]
-    if strange:
+    ids = project.block.point_ids
+    known = {name: k for k, name in enumerate(ids if board.kind == "points" else board.names)}
+    if strange := [name for name in ids if name not in known]:
         raise InputError(phrase("board-project.points", names=strange), file=project.path)
-    return np.array([known[name] for name in project.block.point_ids], dtype=np.int64)
+    return np.array([known[name] for name in ids], dtype=np.int64)
 
 
 def _with_places(board: Board, block: Block, number: Indices) -> Board:
@@ -237,7 +232,6 @@ def _with_places(board: Board, block: Block, number: Indices) -> Board:
 
 
 def adjusted_project(calibrated: Calibrated) -> Project:
-    """Convert an adjusted calibration to a project with adjusted values."""
     return project_of(calibrated.restarted_calibration())
 
 
@@ -254,46 +248,37 @@ def rig_of_project(project: Project) -> Rig:
     block = project.block
     if not block.cameras:
         raise InputError(phrase("board-project.cameras"), file=project.path)
-    return Rig(
-        cameras=tuple(
-            shifted(each, -MIDDLE).replace(name=name)
-            for each, name in zip(block.cameras, block.camera_names, strict=True)
-        ),
-        sizes=tuple(project.sizes),
-        sensors=_sensors(project),
-    )
+    pairs = zip(block.cameras, block.camera_names, strict=True)
+    cameras = tuple(shifted(camera, -MIDDLE).replace(name=name) for camera, name in pairs)
+    return Rig(cameras=cameras, sizes=tuple(project.sizes), sensors=_sensors(project))
 
 
 def _sensors(project: Project) -> Floats:
     """Return (K, 4, 4) camera 0 -> camera k; NaN if not on one frame."""
     block = project.block
     found = np.full((len(block.cameras), 4, 4), np.nan)
-    found[0] = np.eye(4)
-    own: dict[int, Sensor] = {}
-    torn = set[int]()
     cameras = dict(zip(block.photo_ids, np.asarray(block.photo_cameras).tolist(), strict=True))
+    mounts: dict[int, set[tuple[int, int]]] = {}
     for photo, frame, sensor in tied_photos(block):
-        camera = cameras[photo]
-        if cameras[frame] != 0 or own.setdefault(camera, sensor) is not sensor:
-            torn.add(camera)
-    for camera in own.keys() - torn - {0}:
-        found[camera] = sensor_pose(own[camera].position, own[camera].attitude)
+        mounts.setdefault(cameras[photo], set()).add((cameras[frame], id(sensor)))
+        found[cameras[photo]] = sensor_pose(sensor.position, sensor.attitude)
+    # A camera on several sensors, or on the frame of another camera, has no pose.
+    torn = [camera for camera, own in mounts.items() if len(own) > 1 or next(iter(own))[0] != 0]
+    found[torn] = np.nan
+    found[0] = np.eye(4)
     return found
 
 
 def lost_beside_cameras(project: Project) -> list[Phrase]:
-    """Return parts of a project that files of its cameras cannot contain."""
     block, known = project.block, [np.isfinite(sensor).all() for sensor in _sensors(project)]
-    counts = (len(block.photo_ids), len(block.point_ids), len(block.image_xy))
-    kinds = ("lost.all-photos", "lost.all-points", "lost.all-images")
-    found = [phrase(kind, n=count) for kind, count in zip(kinds, counts, strict=True)]
+    lost = {"photos": len(block.photo_ids), "points": len(block.point_ids), "images": len(block.image_xy)}
+    found = [phrase(f"lost.all-{name}", n=count) for name, count in lost.items()]
     found.append(phrase("lost.calibration"))
     cameras = [camera.title for camera, fixed in zip(block.cameras, known, strict=True) if not fixed]
     return found + ([phrase("lost.sensors", names=cameras)] if cameras else [])
 
 
 def camera_file(name: str, project: Project) -> Mapping[str, bytes]:
-    """Return the file of cameras in a format of cameras."""
     from photogram.targets.camera_formats import CAMERA_FORMATS
 
     return CAMERA_FORMATS[name](rig_of_project(project))

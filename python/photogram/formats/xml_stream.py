@@ -36,8 +36,6 @@ _UNREADABLE = (*UNPACKABLE, ValueError, LookupError)
 
 @dataclass
 class Element:
-    """An element: its name, attributes, children and text."""
-
     name: str
     attributes: Mapping[str, str]
     file: Path
@@ -55,11 +53,9 @@ class Element:
         return self.place.error(message)
 
     def child(self, name: str) -> Element | None:
-        """Return the first child of a name."""
         return next((each for each in self.children if each.name == name), None)
 
     def all(self, name: str) -> Iterator[Element]:
-        """Yield the children of a name."""
         return (each for each in self.children if each.name == name)
 
     def need(self, name: str) -> Element:
@@ -70,7 +66,6 @@ class Element:
         return found
 
     def word(self, name: str, default: str = "") -> str:
-        """Return the text of a child."""
         found = self.child(name)
         return default if found is None else found.text.strip()
 
@@ -206,14 +201,11 @@ def read_stream(path: Path, take: Mapping[str, Callable[[Element], Any]], root: 
     except UNPACKABLE as error:
         raise InputError(phrase("xml.packed", reason=str(error)), file=path) from None
     except xml.parsers.expat.ExpatError as error:
-        what = xml.parsers.expat.ErrorString(error.code)
-        raise InputError(
-            phrase("xml.syntax", reason=what, column=error.offset + 1), file=path, record=error.lineno
-        ) from None
+        fields = {"reason": xml.parsers.expat.ErrorString(error.code), "column": error.offset + 1}
+        raise Place(path, error.lineno).error(phrase("xml.syntax", **fields)) from None
     except (ValueError, LookupError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(
-            phrase("xml.syntax", reason=str(error), column=1), file=path, record=parser.CurrentLineNumber
-        ) from None
+        place = Place(path, parser.CurrentLineNumber)
+        raise place.error(phrase("xml.syntax", reason=str(error), column=1)) from None
     return first[0]

@@ -59,7 +59,8 @@ def test_angles(weighted, side):
 def test_residuals_and_redundancy(weighted, side):
     _, result, outcome = weighted
     truth = answers()["weighted"]["solution"]
-    mine = np.array([each.serial == f"{SERIAL}{side}" for each in outcome.images])[result.block.image_photos]
+    serials = outcome.contents.network.measures.serials
+    mine = outcome.image_serials == list(serials).index(f"{SERIAL}{side}")
     order = np.argsort(result.block.image_points[mine])
     # The line, then the sample, in 0.007 mm of the focal plane; the right camera is turned by 180 degrees.
     found = (outcome.residuals[mine][order][:, ::-1]) * (1.0 if side == "L" else -1.0)

@@ -14,7 +14,7 @@ def test_defaults_are_those_of_jigsaw():
     own = read_settings("")
     assert own == Settings()
     assert (own.ck_degree, own.ck_solve_degree, own.spk_degree, own.spk_solve_degree) == (2, 2, 2, 2)
-    assert (own.angle_coefficients, own.position_coefficients) == (1, 0)
+    assert own.coefficients == (0, 1)
     assert own.twist
     assert not own.radius
 
@@ -44,7 +44,7 @@ def test_every_setting_changes_its_field(name):
 )
 def test_how_many_coefficients_are_unknown(words, angles, positions):
     own = read_settings(words)
-    assert (own.angle_coefficients, own.position_coefficients) == (angles, positions)
+    assert own.coefficients == (positions, angles)
 
 
 def test_coefficients_beyond_the_third_have_no_weight():

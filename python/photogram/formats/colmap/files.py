@@ -125,8 +125,6 @@ class Rig:
 
 @dataclass(frozen=True)
 class SensorImage(Sensor):
-    """An image of a sensor."""
-
     image: int = _form("Q", "DATA_ID")
 
 
@@ -146,7 +144,7 @@ class Frame:
 class Model:
     """A model; without rigs and frames each camera is a rig.
 
-    `points` is a table of `POINT`, and `point_places` the locations of its rows in files.
+    `points` is a table of `POINT`, and `point_place` returns the location of a row in files.
     """
 
     path: Path
@@ -155,7 +153,7 @@ class Model:
     points: Table
     rigs: list[Rig] = field(default_factory=list)
     frames: list[Frame] = field(default_factory=list)
-    point_places: Sequence[Place] = ()
+    point_place: Callable[[int], Place] = lambda _: Place()
 
     @cached_property
     def numbers(self) -> Indices:
@@ -191,7 +189,6 @@ _HEADS = {
 
 
 def _read(source: _Line | _Bytes, kind: type[_Kind]) -> _Kind:
-    """Return a record of declared fields."""
     values: dict[str, Any] = {"place": source.place} if hasattr(kind, "place") else {}
     for name, form in layout(kind).items():  # type: ignore[arg-type]
         if form.number is None:
@@ -258,8 +255,6 @@ class _Line:
 
 
 class _Bytes:
-    """The bytes of a file, record by record."""
-
     def __init__(self, path: Path, least: int) -> None:
         self.path, self.data, self.at, self.record = path, read_bytes(path), 0, 0
         self.records = self.count(least)
@@ -354,7 +349,7 @@ def read_model(folder: Path) -> Model:
     return model
 
 
-def _text_points(folder: Path) -> tuple[Table, Sequence[Place]]:
+def _text_points(folder: Path) -> tuple[Table, Callable[[int], Place]]:
     rows, places = [], []
     for place in filled_lines(folder / "points3D.txt"):
         line = _Line(place)
@@ -365,10 +360,10 @@ def _text_points(folder: Path) -> tuple[Table, Sequence[Place]]:
             raise place.error(phrase("colmap.groups", n=len(track), size=2, names=names))
         rows.append((number, xyz, rgb, error, len(track) // 2))
         places.append(place)
-    return np.array(rows, POINT), places
+    return np.array(rows, POINT), places.__getitem__
 
 
-def _binary_points(path: Path) -> tuple[Table, Sequence[Place]]:
+def _binary_points(path: Path) -> tuple[Table, Callable[[int], Place]]:
     file, size = _Bytes(path, POINT.itemsize), POINT.itemsize
     starts = np.empty(file.records, dtype=np.int64)
     unpack, data, last, at = struct.Struct("<Q").unpack_from, file.data, len(file.data), file.at
@@ -385,24 +380,10 @@ def _binary_points(path: Path) -> tuple[Table, Sequence[Place]]:
     for first in range(0, file.records, 1 << 16):
         part = starts[first : first + (1 << 16), np.newaxis] + np.arange(size)
         rows[first : first + (1 << 16)] = raw[part]
-    return rows.reshape(-1).view(POINT), _Places(path, file.records)
-
-
-class _Places(Sequence[Place]):
-    """Locations of records, created on demand."""
-
-    def __init__(self, path: Path, number: int) -> None:
-        self.path, self.number = path, number
-
-    def __len__(self) -> int:
-        return self.number
-
-    def __getitem__(self, row: int) -> Place:  # type: ignore[override]
-        return Place(self.path, row + 1)
+    return rows.reshape(-1).view(POINT), lambda row: Place(path, row + 1)
 
 
 def _values(record: Any) -> Iterator[tuple[str, tuple[Any, ...]]]:
-    """Yield the values of a record with their forms."""
     for name, form in layout(type(record)).items():  # type: ignore[arg-type]
         value = getattr(record, name)
         if isinstance(form.kind, str):
@@ -413,8 +394,6 @@ def _values(record: Any) -> Iterator[tuple[str, tuple[Any, ...]]]:
 
 
 def binary_files(model: Model) -> dict[str, bytes]:
-    """Return the binary files of a model."""
-
     def packed(kind: str, values: tuple[Any, ...]) -> bytes:
         if kind == "features":
             return struct.pack("<Q", len(values[0])) + bytes(values[0])
@@ -466,7 +445,6 @@ def text_files(model: Model) -> dict[str, bytes]:
 
 
 def _records(model: Model) -> dict[str, Sequence[Any]]:
-    """Return the records of all files but points."""
     return {name: getattr(model, name) for name in ("cameras", "images", "rigs", "frames")}
 
 

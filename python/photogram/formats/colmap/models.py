@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -37,8 +37,6 @@ MAX_DIFFERENCE, NORMALISED = 1e-2, 1e-6
 
 
 def read(path: Path, options: ReadOptions) -> Project:
-    """Read a model."""
-    del options
     folder = colmap(path)
     if folder is None:
         raise InputError(phrase("colmap.files"), file=path)
@@ -59,11 +57,11 @@ def _project(model: files.Model, path: Path) -> Project:
     if not finite.all():
         row = int(np.searchsorted(np.cumsum(model.counts), np.argmin(finite), side="right"))
         raise images[row].place.error(phrase("format.finite", name="a feature"))
-    _check_finite(model.points["xyz"], model.point_places, "the position")
+    _check_finite(model.points["xyz"], model.point_place, "the position")
     _, first = np.unique(numbers := model.points["number"], return_index=True)
     if len(first) < len(numbers):
         row = int(np.setdiff1d(np.arange(len(numbers)), first)[0])
-        raise model.point_places[row].error(phrase("format.repeated", what="point", name=str(numbers[row])))
+        raise model.point_place(row).error(phrase("format.repeated", what="point", name=str(numbers[row])))
     names = list(block.photo_ids)
     rotations, translations, off = _rigid([each.pose for each in images], [each.place for each in images])
     if len(off):
@@ -79,24 +77,21 @@ def _project(model: files.Model, path: Path) -> Project:
     block.images(photos, points, model.features["xy"][rows])
     if len(rows):
         block.lacks.append(Phrase("read.placeless", {"option": Phrase("option.control")}))
-    return block.project(
-        details={
-            "image numbers": dict(zip(names, model.numbers.tolist(), strict=True)),
-            "colours": NamedValues(block.point_ids, model.points["rgb"]),
-        }
-    )
+    image_numbers = dict(zip(names, model.numbers.tolist(), strict=True))
+    colours = NamedValues[list[int]](block.point_ids, model.points["rgb"])
+    return block.project(details={"image numbers": image_numbers, "colours": colours})
 
 
-def _check_finite(values: Floats, places: Sequence[Place], name: str) -> None:
+def _check_finite(values: Floats, place: Callable[[int], Place], name: str) -> None:
     finite = np.isfinite(values).all(axis=1)
     if not finite.all():
-        raise places[int(np.argmin(finite))].error(phrase("format.finite", name=name))
+        raise place(int(np.argmin(finite))).error(phrase("format.finite", name=name))
 
 
 def _rigid(poses: Sequence[Sequence[float]], places: Sequence[Place]) -> tuple[Floats, Floats, Indices]:
     """Return (n, 3, 3) rotations, (n, 3) translations, and rows of quaternions without unit length."""
     table = np.array(poses, dtype=float).reshape(-1, 7)
-    _check_finite(table[:, 4:], places, "the translation")
+    _check_finite(table[:, 4:], places.__getitem__, "the translation")
     with np.errstate(over="ignore", invalid="ignore"):
         lengths = np.linalg.norm(table[:, :4], axis=1)
         differences = np.abs(lengths - 1)
@@ -111,7 +106,6 @@ def _rigid(poses: Sequence[Sequence[float]], places: Sequence[Place]) -> tuple[F
 def _composed(
     model: files.Model, rotations: Floats, translations: Floats, messages: list[Message]
 ) -> list[FrameOf]:
-    """Compose poses of frames and rigs to poses of images."""
     if not model.frames:
         return []
     cameras = {camera.number: str(camera.number) for camera in model.cameras}
@@ -223,8 +217,6 @@ def write(kind: str, project: Project) -> Mapping[str, bytes]:
 
 @dataclass(frozen=True)
 class _Written:
-    """A model with the numbers of photos, points and cameras."""
-
     model: files.Model
     photos: dict[str, int]
     points: dict[str, int]
@@ -237,10 +229,8 @@ def _written(project: Project) -> _Written:
     block, details = project.block, project.details
     cameras, photo_cameras = known_cameras(block)
     numbers = numbered([camera.name for camera in cameras])
-    records = [
-        _record(camera, size, numbers[camera.name])
-        for camera, size in zip(cameras, sizes_of(project), strict=True)
-    ]
+    own = (numbers[camera.name] for camera in cameras)
+    records = sorted(map(_record, cameras, sizes_of(project), own), key=lambda camera: camera.number)
     rows = np.flatnonzero(known_poses(block))
     if not len(rows):
         raise InputError(phrase("format.poses"))
@@ -266,19 +256,16 @@ def _written(project: Project) -> _Written:
     features = np.empty(len(image_rows), files.FEATURE)
     features["xy"] = to_corner(project)[image_rows]
     features["point"] = point_numbers[block.image_points[image_rows]]
-    names = sorted(photos, key=lambda name: photos[name])
+    names = sorted(photos, key=photos.__getitem__)
     parts = np.split(features, np.searchsorted(np.sort(owners), [photos[name] for name in names])[1:])
-    images = [
-        files.Image(photos[name], poses[name], of_photo[name], name, part)
-        for name, part in zip(names, parts, strict=True)
-    ]
+    pairs = zip(names, parts, strict=True)
+    images = [files.Image(photos[name], poses[name], of_photo[name], name, own) for name, own in pairs]
     point_rows = point_rows[np.argsort(point_numbers[point_rows], kind="stable")]
     colours = details.get("colours", {})
     table = np.zeros(len(point_rows), files.POINT)
     table["number"], table["xyz"], table["error"] = point_numbers[point_rows], positions[point_rows], -1.0
     rgb = [colours.get(block.point_ids[row], (0, 0, 0)) for row in point_rows.tolist()]
     table["rgb"] = np.array(rgb, dtype=np.int64).reshape(-1, 3)
-    records.sort(key=lambda camera: camera.number)
     model = files.Model(project.path, records, images, table, rigs, frames)
     return _Written(model, photos, points, numbers, image_rows)
 
@@ -318,12 +305,9 @@ def _rigs(
     mounted = {number for own in sensors.values() for number in own}
     rigs = []
     for number in sorted(set(numbers.values()) - mounted):
-        reference = files.Sensor(files.CAMERA, number)
-        others = tuple(
-            files.MountedSensor(files.CAMERA, other, True, pose)
-            for other, pose in sorted(sensors.get(number, {}).items())
-        )
-        rigs.append(files.Rig(number, 1 + len(others), (reference,), others))
+        mounts_of = sorted(sensors.get(number, {}).items())
+        others = tuple(files.MountedSensor(files.CAMERA, other, True, pose) for other, pose in mounts_of)
+        rigs.append(files.Rig(number, 1 + len(others), (files.Sensor(files.CAMERA, number),), others))
     frames = []
     for name, names in members.items():
         data = tuple(files.SensorImage(files.CAMERA, cameras[each], photos[each]) for each in names)
@@ -335,10 +319,10 @@ def covariance_files(project: Project, result: Result) -> Mapping[str, bytes]:
     """Return the covariances of a result: docs/formats/colmap.md."""
     model = _written(project)
     block = result.block
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
-    photos = {number: rows[name] for name, number in model.photos.items()}
-    places = {name: row for row, name in enumerate(block.point_ids)}
-    points = {number: places[name] for name, number in model.points.items()}
+    photos, points = (
+        {numbers[name]: row for row, name in enumerate(names) if name in numbers}
+        for names, numbers in ((block.photo_ids, model.photos), (block.point_ids, model.points))
+    )
     points = {number: row for number, row in points.items() if result.used_points[row]}
     about = {
         "format": 1,
@@ -388,12 +372,10 @@ def _triangles(rows: Mapping[int, int], covariances: Floats, number: str) -> byt
 
 
 def _camera_covariances(model: _Written, result: Result) -> bytes:
+    matrices = {model.cameras.get(each.name): each.covariance for each in result.cameras}
     found = []
-    own = {each.name: each.covariance for each in result.cameras}
-    names = {number: name for name, number in model.cameras.items()}
     for camera in model.model.cameras:
-        count = len(camera.parameters)
-        matrix = own.get(names[camera.number])
+        count, matrix = len(camera.parameters), matrices.get(camera.number)
         if matrix is None or matrix.shape != (count, count):
             matrix = np.zeros((count, count))
         triangle = packed(matrix[np.newaxis])[0].astype("<f8")

@@ -22,7 +22,6 @@ from photogram.formats.csm.reading import (
     from_pixels,
     isd_of,
     not_zero,
-    read_drift,
     transformed,
 )
 from photogram.io.files import reading
@@ -56,13 +55,11 @@ _CHANGED = ("AlphaCube", "Mapping")
 
 
 def is_cube(path: Path) -> bool:
-    """Return whether a file is an ISIS cube."""
     with reading(path), path.open("rb") as file:
         return file.read(len(_MARK)).lower() == _MARK.lower()
 
 
 def read_label(path: Path) -> Group:
-    """Return the label of a cube."""
     text = b""
     with reading(path), path.open("rb") as file:
         while (end := _END.search(text)) is None:
@@ -104,11 +101,8 @@ class _Table:
         self.rows = self._rows()
 
     def error(self, message: str | Phrase) -> InputError:
-        return InputError(
-            phrase("error.at", what=phrase("csm.table", name=self.name), message=message),
-            file=self.path,
-            record=self.label.line,
-        )
+        message = phrase("error.at", what=phrase("csm.table", name=self.name), message=message)
+        return InputError(message, file=self.path, record=self.label.line)
 
     def _rows(self) -> Floats:
         records, width = self.keys["Records"].whole(1), len(self.columns)
@@ -164,9 +158,8 @@ def read_positions(label: Group, path: Path) -> Positions:
         times, places = table.sampled(_POLYNOMIALS[0], "Spk")
         return Positions(times, KM * places, None, "lagrange")
     if joined not in _JOINED:
-        raise table.error(
-            phrase("format.unknown", what="CacheType", value=joined, names=[*_JOINED, _POLYNOMIAL])
-        )
+        names = [*_JOINED, _POLYNOMIAL]
+        raise table.error(phrase("format.unknown", what="CacheType", value=joined, names=names))
     speeds = KM * table.of(_SPEEDS) if table.has(_SPEEDS) else None
     if speeds is None and _JOINED[joined] == "hermite":
         raise table.error(phrase("csm.velocities"))
@@ -184,14 +177,14 @@ def read_turns(label: Group, name: str, path: Path) -> Turns:
     return Turns(table.times, constant @ quaternions, "linear")
 
 
-def _named(instrument: Tree) -> tuple[str, str]:
-    return instrument["SpacecraftName"].text().upper(), instrument["InstrumentId"].text().upper()
+def _instrument(label: Group, path: Path) -> tuple[Tree, str, str]:
+    """Return the values of the instrument, and the names of the spacecraft and the instrument."""
+    own = _members(label.need("IsisCube", path).need("Instrument", path), path)
+    return own, own["SpacecraftName"].text().upper(), own["InstrumentId"].text().upper()
 
 
 def serial_number(label: Group, path: Path) -> str:
-    """Return the serial number of a cube in control networks."""
-    instrument = _members(label.need("IsisCube", path).need("Instrument", path), path)
-    spacecraft, name = _named(instrument)
+    instrument, spacecraft, name = _instrument(label, path)
     if spacecraft == _LRO and name in _NAC:
         return f"LRO/{instrument['SpacecraftClockStartCount'].text()}/{name}"
     apollo = _APOLLO.fullmatch(spacecraft)
@@ -210,8 +203,7 @@ def read_cube(path: Path) -> Isd:
     for changed in _CHANGED:
         if cube.groups(changed):
             raise InputError(phrase("csm.derived", name=changed), file=path)
-    instrument = _members(cube.need("Instrument", path), path)
-    spacecraft, name = _named(instrument)
+    instrument, spacecraft, name = _instrument(label, path)
     if spacecraft != _LRO or name not in _NAC:
         raise InputError(phrase("csm.instrument", instrument=name, spacecraft=spacecraft), file=path)
     keywords = _members(label.need("NaifKeywords", path), path)
@@ -225,7 +217,7 @@ def read_cube(path: Path) -> Isd:
     pointing = read_turns(label, "InstrumentPointing", path)
     rate = not_zero(instrument["LineExposureDuration"]) / 1000
     lines = Lines([[0.0, _start(instrument, keywords), rate]])
-    lines, remarks = fitting(lines, count, pointing.times, read_drift(keywords, code))
+    lines, remarks = fitting(lines, count, pointing.times, keywords, code)
     return Isd(
         path,
         "line",
@@ -313,25 +305,20 @@ def read_list(path: Path) -> dict[str, Path]:
             if error.file is not None:
                 message = phrase("error.at", what=str(error.file), message=message)
             raise place.error(message) from None
-        if serial in found:
+        if found.setdefault(serial, file) is not file:
             raise place.error(phrase("format.repeated", what="serial number", name=serial))
-        found[serial] = file
     if not found:
         raise InputError(phrase("format.missing", what="images"), file=path)
     return found
 
 
 def _of_line(text: str, folder: Path) -> tuple[str, Path]:
-    """Return serial number and file of a line."""
     serial, comma, rest = text.partition(",")
-    alone = folder / text
-    if comma and not alone.is_file():
-        file = folder / rest.strip()
-        if not file.is_file():
-            raise InputError(phrase("csm.file", name=rest.strip()))
-        return serial.strip(), file
-    if not alone.is_file():
-        raise InputError(phrase("csm.file", name=text))
-    if not is_cube(alone):
+    is_alone = not comma or (folder / text).is_file()
+    name = text if is_alone else rest.strip()
+    file = folder / name
+    if not file.is_file():
+        raise InputError(phrase("csm.file", name=name))
+    if is_alone and not is_cube(file):
         raise InputError(phrase("csm.isd-serial"))
-    return serial_number(read_label(alone), alone), alone
+    return serial_number(read_label(file), file) if is_alone else serial.strip(), file

@@ -291,6 +291,5 @@ class Isd:
 
 
 def check_choice(pixels: Any, interpolation: Any) -> None:
-    """Reject unknown pixel counting and interpolation."""
     one_of("pixels", pixels, get_args(Pixels))
     one_of("interpolation", interpolation, get_args(Pixels))

@@ -10,13 +10,7 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import numbers
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.formats.csm.isd import (
-    HALF,
-    Framelets,
-    Isd,
-    Pixels,
-    check_choice,
-)
+from photogram.formats.csm.isd import HALF, Framelets, Isd, Pixels, check_choice
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
 from photogram.network.moving_photos import LineSensor, Timed
@@ -50,15 +44,9 @@ def trajectory_of(
     own = places.interpolation or joined
     if own == "hermite" and places.velocities is None:
         raise isd.error(phrase("csm.velocities"))
-    table = Table(
-        places.times,
-        places.places,
-        pointing.times,
-        np.swapaxes(pointing.matrices, 1, 2) * isd.axes,
-        velocities=places.velocities if own == "hermite" else None,
-        interpolation=own,
-        attitude_interpolation=pointing.interpolation or joined,
-    )
+    attitudes = np.swapaxes(pointing.matrices, 1, 2) * isd.axes
+    velocities, turned = places.velocities if own == "hermite" else None, pointing.interpolation or joined
+    table = Table(places.times, places.places, pointing.times, attitudes, velocities, own, turned)
     return Trajectory(name, table, position, rotation, (isd.body.times, isd.body.matrices))
 
 
@@ -113,19 +101,17 @@ class SupportedImage:
         own, isd = self.trajectory, self.isd
         if own is None:
             own = trajectory_of(isd, self.name, interpolation=self.interpolation)
-        object.__setattr__(self, "flown", own)
         # Many sensor names begin with the name of their platform.
         platform, sensor = isd.platform, isd.sensor
         name = sensor if sensor.startswith(platform) else f"{platform} {sensor}"
-        camera = Camera("perspective", {"c": -self.isd.focal_length}, name=name)
-        object.__setattr__(self, "camera", camera)
+        camera = Camera("perspective", {"c": -isd.focal_length}, name=name)
         timed = [Timed(self.name, own, time=isd.time)]
         if isd.lines is not None:
             timed = [Timed(self.name, own, isd.time, lines=isd.lines, line_sensor=self._line_sensor())]
         elif isd.framelets is not None:
             times = map(isd.framelets.time, range(isd.framelets.count))
             timed = [Timed(f"{self.name}/{k}", own, time=time) for k, time in enumerate(times)]
-        object.__setattr__(self, "timed", tuple(timed))
+        vars(self).update(camera=camera, timed=tuple(timed), flown=own)
 
     def _line_sensor(self) -> LineSensor:
         """Return the sensor line: the detector line at the start of the image."""
@@ -156,10 +142,9 @@ class SupportedImage:
             If the arrays have different lengths or contain values that are not numbers.
         """
         own = [np.atleast_1d(numbers(name, each)) for name, each in (("samples", samples), ("lines", lines))]
-        if own[0].ndim != 1 or own[0].shape != own[1].shape:
-            raise InputError(
-                phrase("format.shape", name="lines", required=str(own[0].shape), got=str(own[1].shape))
-            )
+        required, got = (each.shape for each in own)
+        if len(required) != 1 or required != got:
+            raise InputError(phrase("format.shape", name="lines", required=str(required), got=str(got)))
         image = np.column_stack(own) - HALF[self.pixels]
         photos = np.zeros(len(image), dtype=np.int64)
         if self.isd.lines is not None:

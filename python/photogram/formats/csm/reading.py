@@ -14,7 +14,6 @@ from photogram.formats.csm.isd import (
     Framelets,
     Isd,
     Jitter,
-    Pixels,
     Plane,
     Positions,
     Turns,
@@ -23,7 +22,6 @@ from photogram.formats.csm.isd import (
 from photogram.formats.declarations import declared
 from photogram.io.places import at_place, positive
 from photogram.io.tree import Tree
-from photogram.lazy_dataclasses import dataclass
 from photogram.network.lens import Lens, LensModel
 from photogram.network.moving_photos import Lines
 from photogram.network.trajectories import increasing, rotations
@@ -50,7 +48,6 @@ APART = 0.01  # Largest difference of the time tables, relative to the span
 
 
 def isd_of(tree: Tree) -> Isd:
-    """Return the support data in a document."""
     keywords = tree.get("naif_keywords", {})
     kind = cast("Any", _KINDS[tree["name_model"].known("sensor model", _KINDS)])
     size = tree["image_samples"].whole(1), tree["image_lines"].whole(1)
@@ -70,7 +67,7 @@ def isd_of(tree: Tree) -> Isd:
         raise tree["jitter"].error(phrase("csm.jitter"))
     if kind == "line":
         lines = read_lines(tree, center)
-        own["lines"], of_lines = fitting(lines, size[1], pointing.times, read_drift(keywords, code))
+        own["lines"], of_lines = fitting(lines, size[1], pointing.times, keywords, code)
         remarks += of_lines
     elif kind == "push frame":
         own["framelets"] = _framelets(tree, size[1], float(detector.summing[1]))
@@ -160,7 +157,6 @@ def _turns(tree: Tree, name: str) -> Turns:
 
 
 def constant_rotation(table: Tree, key: str) -> Floats:
-    """Return the constant rotation after the rotations of the records."""
     if key not in table:
         return np.eye(3)
     with at_place(table[key]):
@@ -168,7 +164,6 @@ def constant_rotation(table: Tree, key: str) -> Floats:
 
 
 def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
-    """Return the framelets of a push frame camera, each exposed around its own time."""
     own = tree["framelet_height"]
     height = own.number() / summing
     every = tree["interframe_delay"].number()
@@ -181,7 +176,6 @@ def _framelets(tree: Tree, lines: int, summing: float) -> Framelets:
 
 
 def _lens(tree: Tree, focal_length: float) -> Lens | None:
-    """Return the lens; None without distortion."""
     optics = tree["optical_distortion"]
     models = [name for name, _ in optics.items()]
     if len(models) != 1:
@@ -203,19 +197,12 @@ def _detector(tree: Tree, keywords: Tree, code: str | None) -> Detector:
     def pair(form: str) -> Floats:
         return np.array([tree[form.format(axis)].number() for axis in ("sample", "line")])
 
-    centre = tree["detector_center"]
     summing = pair("detector_{}_summing")
     positive(tree["detector_sample_summing"], "the sum of pixels", float(summing.min()))
     csm = from_pixels(tree["focal2pixel_samples"], tree["focal2pixel_lines"])
-    planes: dict[Pixels, Plane] = {"csm": csm, "isis": csm}
-    if code is not None:
-        planes["isis"] = transformed(keywords, code)
-    return Detector(
-        np.array([centre["sample"].number(), centre["line"].number()]),
-        pair("starting_detector_{}"),
-        summing,
-        planes,
-    )
+    isis = csm if code is None else transformed(keywords, code)
+    centre = np.array([tree["detector_center"][axis].number() for axis in ("sample", "line")])
+    return Detector(centre, pair("starting_detector_{}"), summing, {"csm": csm, "isis": isis})
 
 
 def from_pixels(samples: Tree, lines: Tree) -> Plane:
@@ -249,27 +236,10 @@ def transformed(keywords: Tree, code: str) -> Plane:
 
 
 def not_zero(tree: Tree) -> float:
-    """Return a number that is not zero."""
     found = tree.number()
     if not found:
         raise tree.error(phrase("format.zero"))
     return found
-
-
-@dataclass(frozen=True)
-class Drift:
-    """Corrections of line times: rate dt (1 + factor) + further, shift `lines`."""
-
-    factor: float
-    further: float
-    lines: float
-
-    def of(self, lines: Lines) -> Lines:
-        """Return the corrected times of lines."""
-        rows = np.array(lines.table)
-        rows[:, 2] = rows[:, 2] * (1 + self.factor) + self.further
-        rows[:, 1] += self.lines * rows[:, 2]
-        return Lines(rows)
 
 
 def read_lines(tree: Tree, center: float) -> Lines:
@@ -282,21 +252,17 @@ def read_lines(tree: Tree, center: float) -> Lines:
         return Lines(rows - [0.5, -center, 0.0])
 
 
-def read_drift(keywords: Tree, code: str | None) -> Drift | None:
-    """Return the corrections in an instrument's keywords; None without corrections."""
-    names = [
-        f"{code}_{name}" for name in ("MULTIPLI_LINE_ERROR", "ADDITIVE_LINE_ERROR", "ADDITIONAL_PREROLL")
-    ]
-    if code is None or names[0] not in keywords:
-        return None
-    return Drift(*(keywords[name].number() for name in names))
+_DRIFT = ("MULTIPLI_LINE_ERROR", "ADDITIVE_LINE_ERROR", "ADDITIONAL_PREROLL")
+"""Keywords of an instrument: the rate of lines dt is dt (1 + first) + second, shifted by `third` lines."""
 
 
-def fitting(lines: Lines, count: int, table: Floats, drift: Drift | None) -> tuple[Lines, tuple[Phrase, ...]]:
+def fitting(
+    lines: Lines, count: int, table: Floats, keywords: Tree, code: str | None
+) -> tuple[Lines, tuple[Phrase, ...]]:
     """Return line times consistent with the pointing of the file, and remarks.
 
-    `drift` is applied if it improves the agreement with the ends of `table`, the (k,) times of the pointing:
-    rates of newer files include it.
+    The drift in the keywords of an instrument is applied if it improves the agreement with the ends of
+    `table`, the (k,) times of the pointing: rates of newer files include it.
     """
     ends = table[[0, -1]]
 
@@ -304,9 +270,14 @@ def fitting(lines: Lines, count: int, table: Floats, drift: Drift | None) -> tup
         return float(np.abs(np.sort(own.times([0.0, count])) - ends).max())
 
     remarks = []
-    if drift is not None and misfit(drift.of(lines)) < misfit(lines):
-        lines = drift.of(lines)
-        remarks.append(phrase("csm.drift", rate=float(np.asarray(lines.table)[0, 2])))
+    if code is not None and f"{code}_{_DRIFT[0]}" in keywords:
+        factor, further, shift = (keywords[f"{code}_{name}"].number() for name in _DRIFT)
+        rows = np.array(lines.table)
+        rows[:, 2] = rows[:, 2] * (1 + factor) + further
+        rows[:, 1] += shift * rows[:, 2]
+        if misfit(drifted := Lines(rows)) < misfit(lines):
+            lines = drifted
+            remarks.append(phrase("csm.drift", rate=float(rows[0, 2])))
     span, known = float(abs(np.diff(lines.times([0.0, count]))[0])), float(ends[1] - ends[0])
     if known > 0 and abs(span - known) > APART * known:
         percent = 100 * abs(span - known) / max(span, known)
@@ -318,8 +289,6 @@ _FRAME = "USGS_ASTRO_FRAME_SENSOR_MODEL"
 
 
 def _middle(axis: str) -> Callable[[Tree], float | None]:
-    """Return a function that derives the centre of a whole frame."""
-
     def derive(tree: Tree) -> float | None:
         if not tree["name_model"].text().startswith(_FRAME) or tree[f"starting_detector_{axis}"].number():
             return None
@@ -329,7 +298,6 @@ def _middle(axis: str) -> Callable[[Tree], float | None]:
 
 
 def _only_time(tree: Tree) -> Any:
-    """Return the time of the only pointing record."""
     times = tree["instrument_pointing"].get("ephemeris_times", []).value
     return times[0] if isinstance(times, list) and len(times) == 1 else None
 

@@ -51,14 +51,13 @@ _GROUPS = {
 
 
 def read_script(path: Path, options: ReadOptions) -> DbatBuilder:
-    """Read a script and its tables."""
     root = read_stream(path, {}, "document")
     given = root.need("input")
     content = DbatBuilder(path, TITLE)
-    base = path.parent / _known(given, given.attributes.get("base_dir", "$HERE"))
+    base = _path(given, path.parent, given.attributes.get("base_dir") or "$HERE")
     cameras = given.need("cameras")
     if (file := cameras.child("file")) is not None:
-        cameras = read_stream(_path(file, base), {}, "document").need("cameras")
+        cameras = read_stream(_path(file, base, file.text.strip()), {}, "document").need("cameras")
     _cameras(cameras, content)
     for _, table in _tables(given.need("images"), base):
         take_photos(table, content)
@@ -88,21 +87,16 @@ def read_script(path: Path, options: ReadOptions) -> DbatBuilder:
     return content
 
 
-def _path(element: Element, base: Path) -> Path:
-    word = element.text.strip()
+def _path(element: Element, base: Path, word: str) -> Path:
+    """Return a path in a folder, without $HERE, the folder of the script."""
     if not word:
         raise element.error(phrase("format.member", name="file"))
-    return base / _known(element, word)
-
-
-def _known(element: Element, word: str) -> str:
-    """Return a path without $HERE, the folder of the script."""
     own = word.replace("\\", "/")
     if own.startswith("$HERE"):
         own = own.removeprefix("$HERE").removeprefix("/")
     if own.startswith("$") or not own.isprintable():
         raise element.error(phrase("dbat.path", value=word))
-    return own
+    return base / own
 
 
 def _tables(parent: Element, base: Path) -> Iterator[tuple[Element, ColumnTable]]:
@@ -114,11 +108,10 @@ def _tables(parent: Element, base: Path) -> Iterator[tuple[Element, ColumnTable]
         columns = each.attributes.get("format", "")
         if not columns:
             raise each.error(phrase("format.member", name="format"))
-        yield each, untitled(_path(each, base), columns.split(","))
+        yield each, untitled(_path(each, base, each.text.strip()), columns.split(","))
 
 
 def _filter(points: Element) -> Callable[[int], bool]:
-    """Return a function that selects the points of a filter."""
     found = points.child("filter")
     if found is None:
         return lambda _: True
@@ -152,9 +145,8 @@ def _estimates(operations: Element, content: DbatBuilder) -> None:
             elif value == "false":
                 content.free -= set(names)
             else:
-                content.messages.append(
-                    Message(phrase("dbat.estimate", name=word, value=value), content.path, words[word].line)
-                )
+                remark = phrase("dbat.estimate", name=word, value=value)
+                content.messages.append(Message(remark, content.path, words[word].line))
 
 
 def _cameras(parent: Element, content: DbatBuilder) -> None:
@@ -212,11 +204,7 @@ def _sides(element: Element, size: Size) -> tuple[float, float]:
 
 
 def _principal_point(
-    element: Element,
-    size: Size,
-    sides: tuple[float, float],
-    terms: dict[str, float],
-    messages: list[Message],
+    element: Element, size: Size, sides: tuple[float, float], terms: dict[str, float], messages: list[Message]
 ) -> tuple[float, float]:
     middle = size[0] / 2 * sides[0], size[1] / 2 * sides[1]
     if element.word("pp", "default") == "default":
@@ -241,7 +229,6 @@ _FREE = 10  # Number of lines that are searched for a header
 
 
 def is_measurements(path: Path) -> bool:
-    """Return whether a file is a table of observations of PhotoModeler."""
     try:
         begin = read_beginning(path).lower()
     except InputError:
@@ -254,8 +241,7 @@ def _with_sensors(path: Path, title: str, options: ReadOptions) -> DbatBuilder:
     content = DbatBuilder(path, title)
     if options.cameras is not None:
         settings = Settings(path, tables={"cameras": options.cameras}, image="mm")
-        table = read_cameras(Tables(settings, content.messages))
-        for camera, size, pixel, *_ in table.rows:
+        for camera, size, pixel, *_ in read_cameras(Tables(settings, content.messages)).rows:
             if size is None or pixel is None or camera.image_y != "up":
                 raise InputError(phrase("dbat.camera", camera=camera.title), file=options.cameras)
             content.camera(camera, size, pixel)
@@ -295,9 +281,9 @@ def read_measurements(path: Path, options: ReadOptions) -> DbatBuilder:
     if path.name.endswith(MEASURED) and beside.is_file():
         table = titled(beside)
         table.require("id", "x", "y", "z")
-        starts = zip(table.wholes("id").tolist(), table.given(("x", "y", "z")), strict=True)
-        for row, (number, xyz) in enumerate(starts):
-            content.start(number, xyz, table.at(row))
+        numbers, starts = table.wholes("id").tolist(), table.given(("x", "y", "z"))
+        for row, number in enumerate(numbers):
+            content.start(number, starts[row], table.at(row))
     return content
 
 

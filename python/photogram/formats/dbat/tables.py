@@ -20,6 +20,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import Card
+from photogram.formats.plain.tables import check_rows
 from photogram.formats.project import Project, Size
 from photogram.formats.read_options import ReadOptions
 from photogram.io.column_table import ColumnTable
@@ -73,7 +74,6 @@ class DbatBuilder(BlockBuilder):
         self.options = AdjustOptions()
 
     def numbered_photo(self, number: int, path: str, camera: Hashable, place: Failing) -> None:
-        """Add a photo with its file."""
         self.photo(number, camera, place)
         self.paths.append(path)
 
@@ -93,8 +93,8 @@ class DbatBuilder(BlockBuilder):
         middles = np.array(self.sizes)[cameras] / 2
         xy = (pixels - middles) * side * [1, -1]
         self.images(photos, points, xy, sd)
-        held = [[0.0 if number in self.held else np.inf] * 3 for number in self.photo_rows]
-        self.position_sd = self.attitude_sd = held
+        self.position_sd = [[0.0 if number in self.held else np.inf] * 3 for number in self.photo_rows]
+        self.attitude_sd = self.position_sd
         if self.free:
             self.cameras = [each.replace(sd=dict.fromkeys(self.free, np.inf)) for each in self.cameras]
         # Unique names: file names, with folders if necessary
@@ -156,7 +156,6 @@ def take_photos(table: ColumnTable, content: DbatBuilder) -> None:
 
 
 def take_poses(table: ColumnTable, content: DbatBuilder, unit: str = "degrees") -> None:
-    """Add centres and angles omega, phi, kappa."""
     one_word(table.head, "unit of angles", unit, _RADIANS)
     table.require("id", "x", "y", "z", "omega", "phi", "kappa")
     angles = table.given(("omega", "phi", "kappa")) * _RADIANS[unit]
@@ -193,15 +192,11 @@ def take_points(
 
 def _deviations(table: ColumnTable, columns: Sequence[str], common: str) -> Floats:
     """Return (rows, k) standard deviations; NaN without."""
-    whole = table.numbers(common) if common in table else np.full(table.count, math.nan)
+    whole, given = table.numbers(common), table.vectors(columns)
     flat = table.numbers("sxy") if "sxy" in table else whole
-    defaults = (flat, flat, whole)
-    own = [table.numbers(column) for column in columns]
-    found = np.column_stack(
-        [np.where(np.isnan(each), default, each) for each, default in zip(own, defaults, strict=False)]
-    )
-    if (found < 0).any():
-        raise table.error(int(np.argwhere(found < 0)[0][0]), phrase("format.negative"))
+    defaults = np.column_stack((flat, flat, whole))[:, : len(columns)]
+    found = np.where(np.isnan(given), defaults, given)
+    check_rows(table, (found < 0).any(axis=1), phrase("format.negative"))
     return found
 
 
@@ -212,10 +207,9 @@ def take_images(table: ColumnTable, content: DbatBuilder, sd: float = math.nan) 
     own = np.where(np.isnan(own), sd, own)
     for row in np.argwhere(own == 0)[:, 0].tolist():
         positive(table.at(row), "the standard deviation", 0)
-    photos, points = table.wholes("im").tolist(), table.wholes("id").tolist()
-    rows = zip(photos, points, table.given(("x", "y")).tolist(), own, strict=True)
-    for row, (photo, point, (x, y), deviations) in enumerate(rows):
-        content.image(photo, point, x, y, table.at(row), sd=deviations)
+    photos, points, xy = table.wholes("im").tolist(), table.wholes("id").tolist(), table.given(("x", "y"))
+    for row, (photo, point, (x, y)) in enumerate(zip(photos, points, xy.tolist(), strict=True)):
+        content.image(photo, point, x, y, table.at(row), sd=own[row])
 
 
 TITLE = "PhotoModeler export"
@@ -265,7 +259,7 @@ def read_export(path: Path, options: ReadOptions) -> DbatBuilder:
     take("nine standard deviations")
     default = take("the camera")
     take("standard deviations of the camera")
-    cameras = _Cameras(content, default, size)
+    common = default, _sensor(default, 0, "camera", size)
     for head in until_empty():
         number = _number(head, 0)
         if number in content.photo_rows:
@@ -275,7 +269,7 @@ def read_export(path: Path, options: ReadOptions) -> DbatBuilder:
             if _number(card, 0) != number:
                 raise card.place.error(phrase("dbat.photo", number=number, other=card.words[0]))
         file = (head.place.text or "").split(None, 1)[1] if len(head.words) > 1 else ""
-        content.numbered_photo(number, file, cameras.name_of(number, camera), head.place)
+        content.numbered_photo(number, file, _camera_of(camera, number, content, *common), head.place)
         angles = np.radians(pose.numbers(4, "kappa phi omega"))[np.newaxis, ::-1]
         content.pose(number, pose.numbers(1, "X Y Z"), Attitudes.of("omega_phi_kappa", angles).matrices[0])
     _control(until_empty(), content, options)
@@ -304,29 +298,21 @@ def _sensor(card: Card, first: int, name: str, size: Size) -> tuple[Camera, Size
         return sensor_of(name, size, sides, (c, px, py), named)
 
 
-class _Cameras:
-    """The camera of the header, and different cameras of photos."""
-
-    def __init__(self, content: DbatBuilder, head: Card, size: Size) -> None:
-        self.content, self.head, self.size = content, head, size
-        self.common = _sensor(head, 0, "camera", size)
-        self.others: dict[tuple[str, ...], str] = {}
-
-    def name_of(self, number: int, card: Card) -> str:
-        """Return the name of a photo's camera: usually the one of the header, rounded."""
-        given, own = self.head.numbers(0, _CAMERA), card.numbers(1, _CAMERA)
-        words = tuple(card.words[1:11])
-        last = [10.0 ** -len(word.partition(".")[2].lower().partition("e")[0]) for word in words]
-        if (np.abs(given - own) <= np.array(last)).all():
-            if "camera" not in self.content.camera_rows:
-                self.content.camera(*self.common, key="camera")
-            return "camera"
-        if words not in self.others:
-            name = self.others[words] = f"camera of photo {number}"
-            self.content.camera(*_sensor(card, 1, name, self.size), key=name)
-            remark = phrase("dbat.other-camera", photo=number, values=" ".join(words))
-            self.content.messages.append(Message(remark, card.place.file))
-        return self.others[words]
+def _camera_of(
+    card: Card, number: int, content: DbatBuilder, head: Card, common: tuple[Camera, Size, float]
+) -> Hashable:
+    """Add the camera of a photo, usually the one of the header, rounded; return its key."""
+    words, difference = tuple(card.words[1:11]), np.abs(head.numbers(0, _CAMERA) - card.numbers(1, _CAMERA))
+    last = [10.0 ** -len(word.partition(".")[2].lower().partition("e")[0]) for word in words]
+    if (difference <= np.array(last)).all():
+        if "camera" not in content.camera_rows:
+            content.camera(*common, key="camera")
+        return "camera"
+    if words not in content.camera_rows:
+        content.camera(*_sensor(card, 1, f"camera of photo {number}", common[1]), key=words)
+        remark = phrase("dbat.other-camera", photo=number, values=" ".join(words))
+        content.messages.append(Message(remark, card.place.file))
+    return words
 
 
 def _control(cards: Iterable[Card], content: DbatBuilder, options: ReadOptions) -> None:

@@ -61,9 +61,9 @@ def _add_points(
     given = np.isfinite(covariances).all(axis=(1, 2))
     report("isis.no-covariance", rows[own[~given]])
     own, covariances = own[given], covariances[given]
-    bad = np.flatnonzero(~(np.linalg.eigvalsh(covariances) > 0).all(axis=1))
-    if len(bad):
-        raise block.place.error(phrase("isis.covariance", point=points.ids[rows[own[bad[0]]]]))
+    bad = ~(np.linalg.eigvalsh(covariances) > 0).all(axis=1)
+    for row in rows[own[bad]][:1].tolist():
+        raise block.place.error(phrase("isis.covariance", point=points.ids[row]))
     if spheroid:
         axes = local_frames(coordinates[own])
         covariances = axes @ covariances @ axes.transpose(0, 2, 1)
@@ -104,14 +104,11 @@ def read(path: Path, options: ReadOptions) -> Project:
     remarks = [Message(remark, each.path) for each in images for remark in each.supported.isd.remarks]
     measures, points = network.measures, network.points
     again = (measures.rejected | points.rejected[network.point_of_measure]) & ~measures.ignore
-    counts = {
-        "isis.ignored-points": points.ignore.sum(),
-        "isis.ignored-measures": network.is_ignored.sum(),
-        "isis.rejected-measures": again.sum(),
-    }
-    left = [Message.of(code, n=int(n)) for code, n in counts.items() if n]
+    omitted = points.ignore.sum(), network.is_ignored.sum(), again.sum()
+    codes = ("isis.ignored-points", "isis.ignored-measures", "isis.rejected-measures")
+    left = [Message.of(code, n=int(n)) for code, n in zip(codes, omitted, strict=True) if n]
     if unused:
-        left.append(Message(phrase("isis.unused", n=len(unused), names=unused), options.cubes))
+        left.append(Message.of("isis.unused", options.cubes, n=len(unused), names=unused))
     return _project(contents, seen, [*left, *remarks])
 
 
@@ -119,9 +116,8 @@ def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings,
     """Return the images that have measures, in the order of the network."""
     rows = np.unique(network.measures.serial[~network.is_ignored]).tolist()
     seen = [network.measures.serials[row] for row in rows]
-    for serial in seen:
-        if serial not in files:
-            raise InputError(phrase("isis.image", name=serial), file=cubes)
+    for serial in (each for each in seen if each not in files):
+        raise InputError(phrase("isis.image", name=serial), file=cubes)
     held, there, found = set[str](), set(seen), {}
     named = {str(file.resolve()): serial for serial, file in files.items()} if settings.held else {}
     # HELDLIST is a list of serial numbers or files.
@@ -137,8 +133,7 @@ def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings,
         number = observation_number(serial) if settings.observations else serial
         observations.setdefault(number, []).append(serial)
     for number, serials in observations.items():
-        known = {serial in held for serial in serials}
-        if len(known) > 1:
+        if len(known := {serial in held for serial in serials}) > 1:
             raise InputError(phrase("isis.observation", number=number), file=settings.held)
         isds = [read_support(files[serial]) for serial in serials]
         own = solving(one_flight(isds), number, settings, held=True in known, first=isds[0])
@@ -164,9 +159,8 @@ def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
     if not len(rows):
         raise InputError(phrase("format.missing", what="measures that are not ignored"), file=path)
     bad = rows[~(np.isfinite(own.sample[rows]) & np.isfinite(own.line[rows]))]
-    if len(bad):
-        point = network.points.ids[network.point_of_measure[bad[0]]]
-        raise InputError(phrase("isis.measure", point=point), file=path)
+    for point in network.point_of_measure[bad[:1]].tolist():
+        raise InputError(phrase("isis.measure", point=network.points.ids[point]), file=path)
     points, image_points = np.unique(network.point_of_measure[rows], return_inverse=True)
     photos, xy, sd = np.zeros(len(rows), np.int64), np.zeros((len(rows), 2)), np.zeros(len(rows))
     of_serial = dict(zip(own.serials, rows_of_each(own.serial[rows], len(own.serials)), strict=True))
@@ -211,14 +205,10 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
         a, b = contents.different[0].supported.isd.radii
         spheroid = Spheroid((2 * a + b) / 3, (2 * a + b) / 3)
     timed = [each for own in contents.different for each in own.supported.timed]
+    flown = [own.supported.flown for own in contents.different for _ in own.supported.timed]
     # Approximate poses: of frames, and of the first lines of scanners.
-    found = [
-        about(
-            own.supported.flown, float(each.time or 0.0 if each.lines is None else each.lines.times([0.0])[0])
-        )
-        for own in contents.different
-        for each in own.supported.timed
-    ]
+    times = [each.time or 0.0 if each.lines is None else each.lines.times([0.0])[0] for each in timed]
+    found = [about(own, float(time)) for own, time in zip(flown, times, strict=True)]
     axes = Cartesian(spheroid)
     centres = axes.from_cartesian(np.array([centre for centre, _ in found]))
     matrices = axes.to_local(np.array([matrix for _, matrix in found]), centres)
@@ -240,6 +230,5 @@ def _project(contents: PlanetaryContents, seen: _Seen, messages: list[Message]) 
     fields = {"number": PITCHES, "unit": "px", "option": option_sd("images")}
     block.lacks.append(Phrase("read.images", fields))
     details = {DETAILS: contents, "further inputs": [each.path for each in contents.different]}
-    return block.project(
-        details=details, title=contents.network.network_id or "", timed=timed, spheroid=spheroid
-    )
+    title = contents.network.network_id or ""
+    return block.project(details=details, title=title, timed=timed, spheroid=spheroid)

@@ -14,6 +14,7 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.io.files import read_bytes, reading
+from photogram.io.places import Place
 from photogram.io.pvl import Group, Quantity, parsed
 from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.words import phrase
@@ -37,21 +38,14 @@ _Codes = NDArray[np.int8]
 _Indices = NDArray[np.int32]
 _Rest = tuple[NDArray[np.uint8], NDArray[np.int64]]
 
-_ABSENT: Mapping[type, np.generic] = {
-    np.bool_: np.bool_(False),
-    np.int8: np.int8(-1),
-    np.int32: np.int32(-1),
-    np.float64: np.float64(np.nan),
-}
-"""Missing values of columns by type."""
+_ABSENT = {np.bool_: False, np.int8: -1, np.int32: -1, np.float64: np.nan}  # Missing values by type
 
 
-def _column(kind: type, names: str = "", width: int = 1) -> Any:
+def _column(kind: Any, names: str = "", width: int = 1) -> Any:
     """Declare a column: type, names in the engine if each number of a row has one, numbers per row."""
     own = tuple(names.split())
-    return field(
-        default=None, metadata={"absent": _ABSENT[kind], "names": own, "shape": (len(own) or width,)}
-    )
+    column = {"absent": kind(_ABSENT[kind]), "names": own, "shape": (len(own) or width,)}
+    return field(default=None, metadata=column)
 
 
 def _check_shape(name: str, values: Any, shape: tuple[int, ...]) -> None:
@@ -123,15 +117,13 @@ class ControlPoints(_Columns):
     # 3 reference, 4 ellipsoid, 5 DEM, 6 basemap, 7 bundle solution
     apriori_source: _Codes = _column(np.int8)
     apriori_radius_source: _Codes = _column(np.int8)
-    apriori: Floats = _column(
-        np.float64, "apriori_x apriori_y apriori_z"
-    )  # (n, 3) coordinates before an adjustment
+    # (n, 3) coordinates before an adjustment
+    apriori: Floats = _column(np.float64, "apriori_x apriori_y apriori_z")
     apriori_covariance: Floats = _column(np.float64, width=6)
     # (n, 3) whether latitude, longitude and radius are weighted
     constrained: Bools = _column(np.bool_, "latitude_constrained longitude_constrained radius_constrained")
-    adjusted: Floats = _column(
-        np.float64, "adjusted_x adjusted_y adjusted_z"
-    )  # (n, 3) coordinates of an adjustment
+    # (n, 3) coordinates of an adjustment
+    adjusted: Floats = _column(np.float64, "adjusted_x adjusted_y adjusted_z")
     adjusted_covariance: Floats = _column(np.float64, width=6)
     # All other message fields as bytes, and the start of each point (n + 1); written unchanged
     rest: _Rest = None  # type: ignore[assignment]  # Created if missing
@@ -252,7 +244,7 @@ _BINARY_VERSIONS = ("2", "5")
 _TEXT_VERSIONS = ("3", "4", "5")
 _OLDEST = "1"  # Version of a network without a version
 _LISTED = 2  # Version whose header contains the lengths of points
-_PLACES = ("HeaderStartByte", "HeaderBytes", "PointsStartByte", "PointsBytes")
+PLACES = ("HeaderStartByte", "HeaderBytes", "PointsStartByte", "PointsBytes")
 _HEADER = {key.lower(): name for key, name in HEADER.items()}
 
 
@@ -263,12 +255,10 @@ def _kind(data: bytes) -> str:
 
 
 def is_network(head: bytes) -> bool:
-    """Return whether this is the start of a control network."""
     return _kind(head) in (_BINARY, _TEXT)
 
 
 def is_binary(path: Path) -> bool:
-    """Return whether a control network is binary."""
     with reading(path), path.open("rb") as file:
         return _kind(file.read(LABEL_BYTES)) == _BINARY
 
@@ -294,7 +284,7 @@ def read_network(path: Path) -> ControlNetwork:
         first: dict[str, int] = {}
         for number, name in enumerate(ids, 1):
             if first.setdefault(name, number) != number:
-                raise InputError(phrase("format.repeated", what="point", name=name), file=path, record=number)
+                raise Place(path, number).error(phrase("format.repeated", what="point", name=name))
     return network
 
 
@@ -330,16 +320,14 @@ def _binary(data: bytes, path: Path) -> ControlNetwork:
     buffer = label.need("ProtoBuffer", path)
     core, info = (buffer.need(name, path) for name in ("Core", "ControlNetworkInfo"))
     version = _version(info, _BINARY_VERSIONS, "binary", path)
-    places = []
-    for key in _PLACES:
-        if (place := _whole(core, key, path)) is None:
-            raise InputError(phrase("format.member", name=key), file=path, record=core.line)
-        places.append(place)
-    start, size, first, points_size = places
+    places = {key: _whole(core, key, path) for key in PLACES}
+    if missing := [key for key, place in places.items() if place is None]:
+        raise InputError(phrase("format.member", name=missing[0]), file=path, record=core.line)
+    start, size, first, points_size = (place or 0 for place in places.values())
     texts, count, lengths, radii, rest = _photocore.control_header(data, start, start + size, path)
     listed = lengths if version == _LISTED else None
     columns = _photocore.control_points(data, first, first + points_size, listed, path)
-    known = {*_HEADER, "numberofpoints", "numberofmeasures", "version", *map(str.lower, _PLACES)}
+    known = {*_HEADER, "numberofpoints", "numberofmeasures", "version", *map(str.lower, PLACES)}
     network = ControlNetwork.of(
         columns,
         **dict(zip(MESSAGE, texts, strict=True)),

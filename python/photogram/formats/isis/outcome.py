@@ -36,8 +36,6 @@ from photogram.words import phrase
 
 @dataclass(frozen=True, eq=False)
 class Outcome:
-    """A network after adjustment of its block."""
-
     contents: PlanetaryContents
     result: Result
 
@@ -48,40 +46,40 @@ class Outcome:
         return np.array([places[name] for name in self.result.block.point_ids], dtype=np.int64)
 
     @cached_property
-    def images(self) -> list[Image]:
-        """The image of each photo of the block."""
-        return [self.contents.images[name] for name in self.result.block.photo_ids]
+    def image_serials(self) -> Indices:
+        """(m,) serial number of each observation, as index in the measures of the network."""
+        block, contents = self.result.block, self.contents
+        rows = {serial: row for row, serial in enumerate(contents.network.measures.serials)}
+        of_photo = [rows[contents.images[name].serial] for name in block.photo_ids]
+        return np.array(of_photo, dtype=np.int64)[block.image_photos]
 
     @cached_property
     def rows(self) -> dict[Image, Indices]:
         """The block observations that are measures in each image of the network."""
-        different = self.contents.different
-        places = {image: place for place, image in enumerate(different)}
-        of_photo = np.array([places[image] for image in self.images], dtype=np.int64)
-        own = rows_of_each(of_photo[self.result.block.image_photos], len(different))
-        return dict(zip(different, own, strict=True))
+        serials = self.contents.network.measures.serials
+        own = dict(zip(serials, rows_of_each(self.image_serials, len(serials)), strict=True))
+        return {image: own[image.serial] for image in self.contents.different}
+
+    @cached_property
+    def keys(self) -> Indices:
+        """(M,) numbers of image and point of the measures of the network."""
+        network = self.contents.network
+        return network.measures.serial.astype(np.int64) * len(network.points) + network.point_of_measure
 
     @cached_property
     def measure_rows(self) -> Indices:
         """(m,) network measure of each observation: first of its point in the image."""
-        network, block = self.contents.network, self.result.block
-        measures, count = network.measures, len(network.points)
-        serial_of = {serial: row for row, serial in enumerate(measures.serials)}
-        of_photo = np.array([serial_of[each.serial] for each in self.images], dtype=np.int64)
-        counting = np.flatnonzero(~network.is_ignored)
-        keys = measures.serial[counting].astype(np.int64) * count + network.point_of_measure[counting]
-        known, first = np.unique(keys, return_index=True)
-        own = of_photo[block.image_photos] * count + self.point_rows[block.image_points]
+        counting = np.flatnonzero(~self.contents.network.is_ignored)
+        known, first = np.unique(self.keys[counting], return_index=True)
+        own = self.image_serials * len(self.contents.network.points)
+        own += self.point_rows[self.result.block.image_points]
         return np.asarray(counting[first[np.searchsorted(known, own)]])
 
     @cached_property
     def rejected(self) -> Bools:
         """(M,) measures of the network that are not ignored and were rejected."""
-        network = self.contents.network
-        measures, count = network.measures, len(network.points)
-        keys = measures.serial.astype(np.int64) * count + network.point_of_measure
-        used = keys[self.measure_rows[self.result.used_images]]
-        return np.asarray(~network.is_ignored & ~np.isin(keys, used))
+        used = self.keys[self.measure_rows[self.result.used_images]]
+        return np.asarray(~self.contents.network.is_ignored & ~np.isin(self.keys, used))
 
     @cached_property
     def residuals(self) -> Floats:
@@ -90,8 +88,7 @@ class Outcome:
         for image, mine in self.rows.items():
             isd = image.supported.isd
             turned = np.linalg.inv(isd.detector.planes["isis"].matrix)
-            own = self.result.residuals[mine] * isd.axes[:2]
-            found[mine] = own @ turned.T / isd.detector.summing
+            found[mine] = self.result.residuals[mine] * isd.axes[:2] @ turned.T / isd.detector.summing
         return found
 
     @cached_property
@@ -115,12 +112,11 @@ class Outcome:
     @cached_property
     def corrections(self) -> Floats:
         """(n, 3) corrections of latitude, longitude and radius, metres."""
-        after = self.latitudes
-        change = after - spherical(self.contents.starts[self.point_rows])
+        latitude, _, radius = self.latitudes.T
+        change = self.latitudes - spherical(self.contents.starts[self.point_rows])
         # Differences across the prime meridian.
         change[:, 1] = (change[:, 1] + np.pi) % (2 * np.pi) - np.pi
-        radius = after[:, 2]
-        metres = np.column_stack([radius, radius * np.cos(after[:, 0]), np.ones(len(after))])
+        metres = np.column_stack([radius, radius * np.cos(latitude), np.ones_like(radius)])
         return np.asarray(change * metres)
 
     @cached_property
@@ -132,8 +128,7 @@ class Outcome:
     @property
     def axes(self) -> Floats:
         """(n, 3, 3) east, north and up at the points, as rows."""
-        places = self.latitudes
-        return local_frames(np.column_stack([places[:, 1], places[:, 0], places[:, 2]]))
+        return local_frames(self.latitudes[:, [1, 0, 2]])
 
 
 def spherical(xyz: Floats) -> Floats:
@@ -183,7 +178,6 @@ class PlanetaryContents:
 
 
 def contents_of(details: Mapping[str, Any]) -> PlanetaryContents:
-    """Return the contents of a project from a control network."""
     found = details.get(DETAILS)
     if not isinstance(found, PlanetaryContents):
         raise InputError(phrase("isis.project"))
@@ -240,7 +234,6 @@ def rejecting(project: Project, adjust: Callable[..., Result]) -> Callable[..., 
 
 
 def rejection_limit(lengths: Floats, multiplier: float) -> float:
-    """Return median + multiplier x 1.4826 x median absolute deviation."""
     median = float(np.nanmedian(lengths))
     return median + multiplier * NORMAL * float(np.nanmedian(np.abs(lengths - median)))
 
@@ -280,11 +273,8 @@ _Columns = Sequence[tuple[tuple[str, ...], Any]]  # Columns with the lines of th
 
 
 def jigsaw_files(outcome: Outcome) -> Mapping[str, bytes]:
-    """Return the files by their names."""
-    images = {
-        image: parameters(image, outcome.result.trajectories[image.solving.trajectory.name])
-        for image in outcome.contents.different
-    }
+    different, flown = outcome.contents.different, outcome.result.trajectories
+    images = {image: parameters(image, flown[image.solving.trajectory.name]) for image in different}
     # Images with fixed poses have fewer coefficients.
     names, rows = [each[:2] for each in max(images.values(), key=len)], []
     for image, own in images.items():
@@ -310,17 +300,13 @@ def _table(columns: _Columns) -> bytes:
 
 
 def _rms(outcome: Outcome, image: Image) -> list[float]:
-    """Return root mean square residuals of an image: samples, lines, both."""
     rows = outcome.rows[image]
     residuals = outcome.residuals[rows[outcome.result.used_images[rows]]]
-    if not len(residuals):
-        return [np.nan] * 3
-    squares = (residuals**2).mean(axis=0)
+    squares = (residuals**2).mean(axis=0) if len(residuals) else np.full(2, np.nan)
     return list(np.sqrt([*squares, squares.mean()]))
 
 
 def _triple(what: str, names: Sequence[str], units: str, values: Floats) -> list[tuple[Any, Floats]]:
-    """Return three columns of (n, 3) values."""
     heads = zip(names, units.split(), strict=True)
     return [((what, name, f"({unit})"), column) for (name, unit), column in zip(heads, values.T, strict=True)]
 
@@ -379,7 +365,6 @@ def _residuals(outcome: Outcome) -> _Columns:
 
 
 def _report(outcome: Outcome, images: Mapping[Image, list[_Coefficient]], points: _Columns) -> Iterator[str]:
-    """Yield the lines of `bundleout.txt`."""
     network, settings = outcome.contents.network, outcome.contents.settings
     facts: dict[str, dict[str, object]] = {
         "JIGSAW: BUNDLE ADJUSTMENT": {
@@ -420,14 +405,11 @@ def _title(text: str) -> list[str]:
 
 def _lines(columns: _Columns) -> list[str]:
     """Return a table as text, with ten decimals."""
-    made = [
-        Column(
-            " ".join(head).strip(),
-            [f"{each:.10f}" if isinstance(each, float) else str(each) for each in values],
-            text=isinstance(values[0], str) if len(values) else False,
-        )
-        for head, values in columns
-    ]
+    made = []
+    for head, values in columns:
+        cells = [f"{each:.10f}" if isinstance(each, float) else str(each) for each in values]
+        is_text = len(values) > 0 and isinstance(values[0], str)
+        made.append(Column(" ".join(head).strip(), cells, text=is_text))
     return table_text(Table("", made))
 
 
@@ -483,8 +465,8 @@ def parameters(image: Image, adjusted: AdjustedTrajectory) -> list[_Coefficient]
                 initial = float(begun[axis, k] * unit)
                 change = float(values[k, axis] - start[k, axis]) * unit
                 apriori = float(given[k, axis] * (degrees if part else 1.0))
-                text = "N/A" if apriori == 0 else repr(apriori) if np.isfinite(apriori) else "FREE"
-                deviation = "N/A" if apriori == 0 else float(sd[k, axis] * unit)
-                numbers = (initial, change, initial + change, text, deviation)
-                found.append((name, k, _UNITS[part], *numbers))
+                deviation = float(sd[k, axis] * unit)
+                free = repr(apriori) if np.isfinite(apriori) else "FREE", deviation
+                weights = free if apriori else ("N/A", "N/A")
+                found.append((name, k, _UNITS[part], initial, change, initial + change, *weights))
     return found

@@ -11,14 +11,14 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from photogram.arguments.types import Floats, Indices
+from photogram.arguments.types import Floats
 from photogram.errors import InputError, message_of
 from photogram.formats.csm.isd import Isd, Polynomials, Positions, Turns, fitted, of_angles, to_angles
 from photogram.formats.csm.photos import trajectory_of
 from photogram.formats.declarations import declared
 from photogram.io.column_table import FALSE, TRUE
 from photogram.io.files import read_lines
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, fields, replace
 from photogram.messages import unknown_name
 from photogram.network.motion import given_poses
 from photogram.network.trajectories import Polynomial, Trajectory
@@ -46,7 +46,7 @@ def solving(isd: Isd, name: str, settings: Settings, *, held: bool, first: Isd) 
     `isd` contains the tables of all images of an observation. `first` is its first image, which defines time
     origin and initial polynomials, as in jigsaw.
     """
-    counts = (0, 0) if held else (settings.position_coefficients, settings.angle_coefficients)
+    counts = (0, 0) if held else settings.coefficients
     position, isd, places = _positions(isd, first.position, settings, counts[0])
     rotation, isd, angles = _angles(isd, first.pointing, settings, counts[1])
     own = trajectory_of(isd, name, interpolation="isis", position=position)
@@ -135,7 +135,6 @@ COMPARED = 16  # Number of times for the comparison
 
 
 def observation_number(serial: str) -> str:
-    """Return the observation of an image from its serial number."""
     count = next((count for begin, count in _KEYWORDS.items() if re.match(begin, serial)), 0)
     if count == 0:
         raise InputError(phrase("isis.observation-rule", image=serial))
@@ -147,32 +146,19 @@ def one_flight(isds: Sequence[Isd]) -> Isd:
     first, *others = isds
     for each in others:
         _check(first, each)
-    positions = [each.position for each in isds]
-    times, rows = _once([each.times for each in positions])
-    speeds = [each.velocities for each in positions if each.velocities is not None]
-    return replace(
-        first,
-        position=Positions(
-            times,
-            np.concatenate([each.places for each in positions])[rows],
-            np.concatenate(speeds)[rows] if len(speeds) == len(isds) else None,
-            first.position.interpolation,
-        ),
-        pointing=_joined([each.pointing for each in isds]),
-        body=_joined([each.body for each in isds]),
-    )
+    names = ("position", "pointing", "body")
+    return replace(first, **{name: _joined([getattr(each, name) for each in isds]) for name in names})
 
 
-def _once(times: Sequence[Floats]) -> tuple[Floats, Indices]:
-    """Return different times in order, and the first record of each."""
-    own, rows = np.unique(np.concatenate(times), return_index=True)
-    return own, rows
-
-
-def _joined(tables: Sequence[Turns]) -> Turns:
-    """Return one table of all records, with one record per time."""
-    times, rows = _once([each.times for each in tables])
-    return Turns(times, np.concatenate([each.matrices for each in tables])[rows], tables[0].interpolation)
+def _joined(tables: Sequence[Any]) -> Any:
+    """Return one table of the records of all in order of time, the first one of each time."""
+    _, rows = np.unique(np.concatenate([each.times for each in tables]), return_index=True)
+    joined: dict[str, Any] = {}
+    for name in (each.name for each in fields(tables[0]) if each.name != "interpolation"):
+        columns = [getattr(each, name) for each in tables]
+        is_known = all(column is not None for column in columns)
+        joined[name] = np.concatenate(columns)[rows] if is_known else None
+    return replace(tables[0], **joined)
 
 
 def _check(first: Isd, other: Isd) -> None:
@@ -190,9 +176,8 @@ def _check(first: Isd, other: Isd) -> None:
     shift = float((np.linalg.norm(places - others, axis=1) / heights).max()) / pixel
     turn = float(np.linalg.norm(axes - turned, axis=(1, 2)).max()) / np.sqrt(2.0) / pixel
     if not max(shift, turn) < APART:
-        raise InputError(
-            phrase("isis.flight", path=first.path, shift=shift, turn=turn, limit=APART), file=other.path
-        )
+        found = {"path": first.path, "shift": shift, "turn": turn, "limit": APART}
+        raise other.error(phrase("isis.flight", **found))
 
 
 Solved = Literal["none", "first", "second", "third", "all"]
@@ -255,13 +240,10 @@ class JigsawSetting(NamedTuple):
         return "NONE" if value is None else word.upper()
 
 
-def _declared() -> Iterator[JigsawSetting]:
-    for names, kind, words, *rest in declared(__file__, "jigsaw.csv"):
-        known = dict(word.split("=") for word in words.split())
-        yield JigsawSetting(names.split(), kind, known, *rest)
-
-
-DECLARED = tuple(_declared())
+DECLARED = tuple(
+    JigsawSetting(names.split(), kind, dict(word.split("=") for word in words.split()), *rest)
+    for names, kind, words, *rest in declared(__file__, "jigsaw.csv")
+)
 PARAMETERS: Mapping[str, JigsawSetting] = {
     name: each for each in DECLARED if each.kind != "otherwise" for name in each.names
 }
@@ -298,18 +280,12 @@ class Settings:
     remarks: tuple[Phrase, ...] = ()  # Remarks on settings replaced by others
 
     @property
-    def angle_coefficients(self) -> int:
-        """Number of free coefficients of each angle."""
-        return _count(self.angles, self.ck_solve_degree)
-
-    @property
-    def position_coefficients(self) -> int:
-        """Number of free coefficients of each coordinate."""
-        return _count(self.positions, self.spk_solve_degree)
-
-
-def _count(solved: Solved, degree: int) -> int:
-    return degree + 1 if solved == "all" else ("none", "first", "second", "third").index(solved)
+    def coefficients(self) -> tuple[int, int]:
+        """Numbers of free coefficients of each coordinate, and of each angle."""
+        solved = (self.positions, self.spk_solve_degree), (self.angles, self.ck_solve_degree)
+        counts = {"none": 0, "first": 1, "second": 2, "third": 3}
+        positions, angles = (counts.get(word, degree + 1) for word, degree in solved)
+        return positions, angles
 
 
 def read_settings(text: str) -> Settings:
@@ -319,8 +295,7 @@ def read_settings(text: str) -> Settings:
     Alternatively, `text` is the path of a file with such lines, in which # begins a comment. The last value
     of a name is used.
     """
-    given: dict[str, Any] = {}
-    remarks: dict[str, Phrase] = {}
+    given, remarks = dict[str, Any](), dict[str, Phrase]()
     for name, value, where in _words(text):
         try:
             if (own := PARAMETERS.get(name)) is not None:
@@ -336,9 +311,8 @@ def read_settings(text: str) -> Settings:
             elif value.lower() not in FALSE:
                 raise InputError(phrase("isis.refused", name=name))
         except InputError as error:
-            raise InputError(
-                phrase("error.at", what=f"{name}={value}", message=message_of(error)), **where
-            ) from None
+            message = phrase("error.at", what=f"{name}={value}", message=message_of(error))
+            raise InputError(message, **where) from None
     return Settings(**given, remarks=tuple(remarks.values()))
 
 

@@ -13,22 +13,10 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.formats.csm.cubes import is_cube
-from photogram.formats.csm.isd import (
-    Polynomials,
-    angle_axes,
-    of_angles,
-    to_angles,
-    to_quaternions,
-)
+from photogram.formats.csm.isd import Polynomials, angle_axes, of_angles, to_angles, to_quaternions
 from photogram.formats.csm.photos import SupportedImage, to_camera, trajectory_of
 from photogram.formats.csm.reading import UNITS, isd_of
-from photogram.formats.isis.network import (
-    HEADER,
-    LABEL_BYTES,
-    MESSAGE,
-    ControlNetwork,
-    is_binary,
-)
+from photogram.formats.isis.network import HEADER, LABEL_BYTES, MESSAGE, PLACES, ControlNetwork, is_binary
 from photogram.formats.isis.outcome import Image, Outcome, contents_of, jigsaw_files
 from photogram.formats.project import Project
 from photogram.io.json import read_json
@@ -45,7 +33,6 @@ _UPPER = np.triu_indices(3)
 
 
 def _header(network: ControlNetwork) -> list[tuple[str, Value]]:
-    """Return the header of a network in the order of ISIS."""
     return [(key, text) for key, name in HEADER.items() if (text := getattr(network, name)) is not None]
 
 
@@ -69,12 +56,8 @@ def binary_network(network: ControlNetwork) -> bytes:
         ("NumberOfMeasures", len(network.measures)),
         ("Version", _VERSION),
     ]
-    places: list[tuple[str, Value]] = [
-        ("HeaderStartByte", LABEL_BYTES),
-        ("HeaderBytes", len(header)),
-        ("PointsStartByte", LABEL_BYTES + len(header)),
-        ("PointsBytes", len(points)),
-    ]
+    sizes = (LABEL_BYTES, len(header), LABEL_BYTES + len(header), len(points))
+    places: list[tuple[str, Value]] = [*zip(PLACES, sizes, strict=True)]
     info = [*_header(network), *counts, *network.others.items]
     inside = [Group("Core", "object", items=places), Group("ControlNetworkInfo", "group", items=info)]
     buffer = Group("ProtoBuffer", "object", inside=[*inside, *network.others.inside])
@@ -141,21 +124,12 @@ def _updated_network(outcome: Outcome) -> ControlNetwork:
     counts = ~np.isnan(outcome.contents.starts[:, 0])
     out = counts.copy()
     out[rows] = False
-    return replace(
-        network,
-        points=replace(
-            points,
-            adjusted=adjusted,
-            adjusted_covariance=covariance,
-            rejected=np.where(counts, out, points.rejected),
-        ),
-        measures=replace(
-            measures,
-            sample_residual=residuals[:, 0],
-            line_residual=residuals[:, 1],
-            rejected=np.where(ignored, measures.rejected, outcome.rejected),
-        ),
-    )
+    rejected = np.where(counts, out, points.rejected)
+    points = replace(points, adjusted=adjusted, adjusted_covariance=covariance, rejected=rejected)
+    sample, line = residuals.T
+    rejected = np.where(ignored, measures.rejected, outcome.rejected)
+    measures = replace(measures, sample_residual=sample, line_residual=line, rejected=rejected)
+    return replace(network, points=points, measures=measures)
 
 
 CLOSE = 0.01  # Largest difference (pixels) between projections with the new tables and with the trajectory
@@ -231,21 +205,18 @@ class _Corrected:
             found["instrument_position"] = own | {"ephemeris_times": times.tolist()}
         if self.angles is not None:
             own, times = found["instrument_pointing"], _halved(self.original.pointing.times, halvings)
-            matrices = of_angles(self._before(times) + self.angles.at(times))
+            angles = to_angles(self._flown(times)[1]) if self.over[1] else np.zeros((len(times), 3))
+            matrices = of_angles(angles + self.angles.at(times))
             constant = np.reshape(own.get("constant_rotation", np.eye(3)), (3, 3))
             own = own | {"quaternions": to_quaternions(constant.T @ matrices).tolist()}
             if len(times) > 1:
-                own["angular_velocities"] = self._turning(self.angles, own, times).tolist()
+                own["angular_velocities"] = self._turning(self.angles, angles, own, times).tolist()
             found["instrument_pointing"] = own | {"ephemeris_times": times.tolist()}
         return found
 
-    def _before(self, times: Floats) -> Floats:
-        """Return the angles to which the polynomials are added."""
-        return to_angles(self._flown(times)[1]) if self.over[1] else np.zeros((len(times), 3))
-
-    def _turning(self, total: Polynomials, own: Mapping[str, Any], times: Floats) -> Floats:
-        """Return angular velocities along inertial axes."""
-        before, rates = self._before(times), total.rates(times)
+    def _turning(self, total: Polynomials, before: Floats, own: Mapping[str, Any], times: Floats) -> Floats:
+        """Return angular velocities along inertial axes; `before` are angles without the polynomials."""
+        rates = total.rates(times)
         if self.over[1]:
             known = _given(own, "angular_velocities", times)
             if known is None:

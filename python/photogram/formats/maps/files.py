@@ -115,12 +115,9 @@ def _geojson(path: Path, layers: Sequence[Layer]) -> dict[Path, bytes]:
                 continue
             name = f"{path.stem}-{each.name}"
             made = Path(folder) / f"{name}.geojson"
-            options = {
-                "RFC7946": "NO" if each.table.crs is None else "YES",
-                "COORDINATE_PRECISION": str(DECIMALS),
-                "DESCRIPTION": each.description,
-            }
-            _write(each, made, "GeoJSON", options)
+            standard = "NO" if each.table.crs is None else "YES"
+            options = {"RFC7946": standard, "COORDINATE_PRECISION": str(DECIMALS)}
+            _write(each, made, "GeoJSON", options | {"DESCRIPTION": each.description})
             files[path.with_name(made.name)] = made.read_bytes()
             files[path.with_name(f"{name}.qml")] = style(each.name).encode()
     return files
@@ -132,14 +129,9 @@ def _write(drawn: Layer, path: Path, driver: str, options: dict[str, str], **mor
     with warnings.catch_warnings():
         # One remark reports a missing system for all layers.
         warnings.filterwarnings("ignore", message="'crs' was not provided")
-        pyogrio.write_dataframe(
-            drawn.table,
-            path,
-            driver=driver,
-            geometry_type=LAYERS[drawn.name][0].geometry,
-            layer_options=options,
-            **more,
-        )
+        kind = LAYERS[drawn.name][0].geometry
+        more |= {"driver": driver, "geometry_type": kind, "layer_options": options}
+        pyogrio.write_dataframe(drawn.table, path, **more)
 
 
 def _symbol(row: DrawnLayer) -> tuple[str, str, Mapping[str, str]]:
@@ -157,26 +149,18 @@ def _symbol(row: DrawnLayer) -> tuple[str, str, Mapping[str, str]]:
 
 
 def style(name: str) -> str:
-    """Return the style of a layer."""
     rows = LAYERS[name]
     attribute = "kind" if rows[0].value else ""
     root = Element("qgis", version="3.22.0", styleCategories="Symbology")
     kind = "categorizedSymbol" if attribute else "singleSymbol"
-    renderer = SubElement(
-        root, "renderer-v2", type=kind, enableorderby="0", forceraster="0", symbollevels="0"
-    )
+    attributes = {"type": kind, "enableorderby": "0", "forceraster": "0", "symbollevels": "0"}
+    renderer = SubElement(root, "renderer-v2", attributes)
     if attribute:
         renderer.set("attr", attribute)
         categories = SubElement(renderer, "categories")
         for row, each in enumerate(rows):
-            own = {
-                "value": each.value,
-                "label": each.value,
-                "symbol": str(row),
-                "render": "true",
-                "type": "string",
-            }
-            SubElement(categories, "category", own)
+            own = {"value": each.value, "label": each.value, "symbol": str(row)}
+            SubElement(categories, "category", own | {"render": "true", "type": "string"})
     drawn = SubElement(renderer, "symbols")
     for row, (form, layer, properties) in enumerate(map(_symbol, rows)):
         symbol = SubElement(drawn, "symbol", type=form, name=str(row), alpha="1", clip_to_extent="1")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.formats.crs import amid, enu_origin, has_place, without_geoid
+from photogram.formats.crs import GEOCENTRIC, amid, enu_origin, has_place, to_system, utm_zone, without_geoid
 from photogram.formats.declarations import declared
 from photogram.formats.project import frame_of
 from photogram.formats.results import Placed, placed
@@ -46,12 +46,8 @@ class DrawnLayer(NamedTuple):
     description: str
 
 
-def _declared() -> Mapping[str, list[DrawnLayer]]:
-    rows = starmap(DrawnLayer, declared(__file__, "layers.csv"))
-    return {name: list(own) for name, own in groupby(rows, lambda row: row.layer)}
-
-
-LAYERS = _declared()
+_ROWS = starmap(DrawnLayer, declared(__file__, "layers.csv"))
+LAYERS = {name: list(rows) for name, rows in groupby(_ROWS, lambda row: row.layer)}
 """The declared layers of maps by name."""
 
 
@@ -92,12 +88,8 @@ def chosen_crs(result: Result) -> str:
         return ""
     if frame.kind == "cartesian":
         return frame.crs
-    from photogram.formats.crs import to_system
-
-    earth, _ = to_system("EPSG:4978", result.photo_positions, frame)
-    latitude, longitude, _ = amid("EPSG:4978", earth)
-    zone = int((longitude + 180.0) // 6.0) % 60 + 1
-    return f"EPSG:{(32600 if latitude >= 0 else 32700) + zone}"
+    earth, _ = to_system(GEOCENTRIC, result.photo_positions, frame)
+    return utm_zone(*amid(GEOCENTRIC, earth)[:2])
 
 
 def map_layers(
@@ -151,21 +143,16 @@ def map_layers(
             one = found.moved(found.points[:1], np.ones((1, 3))) - found.points[:1]
             spacing = spacing / one[:, :2]
         scale = fitting_scale(own, spacing)
-    control, tests = _given(found, found.control_differences()), np.abs(result.control.standardized)
+    rows, given, steps = _given(found, found.control_differences())
+    tests = np.abs(result.control.standardized)
+    largest = np.where(np.isnan(tests), 0.0, tests).max(axis=1, initial=0.0)
     parts: dict[str, _Part] = {
         "photos": _photos(found),
         "footprints": _footprints(found, sizes),
-        "points": _points(found),
+        "points": (found.points, _points(found)),
         "point_ellipses": _ellipses(found, drawn, confidence, scale),
-        "control": (
-            control[1],
-            {
-                "point": _ids(found)[control[0]],
-                **_along("d", control[2]),
-                "largest_test": np.where(np.isnan(tests), 0.0, tests).max(axis=1, initial=0.0),
-            },
-        ),
-        "control_residuals": _vectors(found, *control, scale),
+        "control": (given, {"point": _ids(found)[rows], **_along("d", steps), "largest_test": largest}),
+        "control_residuals": _vectors(found, rows, given, steps, scale),
         "check_residuals": _vectors(found, *_given(found, found.differences()), scale),
         "suspicious": _suspicious(found),
     }
@@ -194,15 +181,15 @@ def _photos(found: Placed) -> _Part:
     images = np.bincount(own, minlength=len(block.photo_ids))
     with np.errstate(invalid="ignore"):
         rms = np.sqrt(np.bincount(own, squares, len(block.photo_ids)) / (2 * images))
-    cameras = (
-        {} if block.photo_cameras is None else {"camera": np.array(block.camera_names)[block.photo_cameras]}
-    )
+    cameras: dict[str, Any] = {}
+    if block.photo_cameras is not None:
+        cameras["camera"] = np.array(block.camera_names)[block.photo_cameras]
     return found.photos, {
         "photo": block.photo_ids,
         **cameras,
         **_deviations(found.photo_covariances),
-        **{f"{name}_deg": column for name, column in zip(_ANGLES, angles.T, strict=True)},
-        **{f"sd_{name}_deg": column for name, column in zip(_ANGLES, deviations.T, strict=True)},
+        **dict(zip((f"{name}_deg" for name in _ANGLES), angles.T, strict=True)),
+        **dict(zip((f"sd_{name}_deg" for name in _ANGLES), deviations.T, strict=True)),
         "images": images,
         f"rms_{block.image_unit}": rms,
     }
@@ -226,13 +213,10 @@ def _footprints(found: Placed, sizes: Sequence[tuple[float, float] | None]) -> _
     }
 
 
-def _points(found: Placed) -> _Part:
-    return found.points, {
-        "point": _ids(found)[found.rows],
-        "kind": found.result.point_kinds[found.rows],
-        "rays": found.result.point_rays[found.rows],
-        **_deviations(found.point_covariances),
-    }
+def _points(found: Placed) -> dict[str, Any]:
+    kinds, rays = (column[found.rows] for column in (found.result.point_kinds, found.result.point_rays))
+    columns = {"point": _ids(found)[found.rows], "kind": kinds, "rays": rays}
+    return columns | _deviations(found.point_covariances)
 
 
 def _with_ellipses(found: Placed, most: int) -> tuple[Indices, int]:
@@ -296,9 +280,8 @@ def _large_tests(found: Placed, types: Sequence[ComponentTests]) -> Iterator[tup
     block, kinds = found.result.block, found.result.kinds
     places = np.full((len(block.point_ids), 3), np.nan)
     places[found.rows] = found.points
-    point_rows, photo_rows = (
-        {name: row for row, name in enumerate(own)} for own in (block.point_ids, block.photo_ids)
-    )
+    point_places = dict(zip(block.point_ids, places, strict=True))
+    photo_places = dict(zip(block.photo_ids, found.photos, strict=True))
     for tests in types:
         for row, k in np.argwhere(np.abs(tests.values) > SUSPICIOUS).tolist():
             axis, moment = tests.axes[k], None
@@ -319,7 +302,7 @@ def _large_tests(found: Placed, types: Sequence[ComponentTests]) -> Iterator[tup
             own |= {"photo": photo, "point": point, "unit": axis.unit}
             own |= {"residual": float(tests.residuals[row, k]), "test": float(tests.values[row, k])}
             if point is not None:
-                yield places[point_rows[point]], own
+                yield point_places[point], own
             elif moment is not None:
                 # The adjusted trajectory at a time.
                 flown = found.result.trajectories[moment.trajectory.name]
@@ -328,7 +311,7 @@ def _large_tests(found: Placed, types: Sequence[ComponentTests]) -> Iterator[tup
                     at = geocentric_to_geographic(at, block.spheroid)
                 yield np.asarray(found.carried(at)[0]), own
             elif photo is not None:
-                yield found.photos[photo_rows[photo]], own
+                yield photo_places[photo], own
 
 
 _SUSPECT = ("what", "photo", "point", "x", "y", "residual", "unit", "test")
@@ -353,8 +336,6 @@ SHARE = 0.3  # Size of a typical drawn ellipse relative to the distance between 
 
 @dataclass(frozen=True, eq=False)
 class Ellipses:
-    """n error ellipses."""
-
     major: Floats  # (n,) semi-axes in the unit of the positions
     minor: Floats
     azimuth: Floats  # (n,) of the major axis, clockwise from the second axis (north): radians, -pi/2 to pi/2
@@ -362,10 +343,8 @@ class Ellipses:
     def outlines(self, scale: float = 1.0) -> Floats:
         """Return (n, 37, 2) closed outlines about the origin, enlarged."""
         around = np.linspace(0.0, math.tau, VERTICES + 1)
-        along, across = (
-            scale * np.outer(self.major, np.cos(around)),
-            scale * np.outer(self.minor, np.sin(around)),
-        )
+        along = scale * np.outer(self.major, np.cos(around))
+        across = scale * np.outer(self.minor, np.sin(around))
         sine, cosine = np.sin(self.azimuth)[:, np.newaxis], np.cos(self.azimuth)[:, np.newaxis]
         found = np.stack([along * sine + across * cosine, along * cosine - across * sine], axis=2)
         found[:, -1] = found[:, 0]

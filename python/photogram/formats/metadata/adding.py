@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
+from photogram.formats.crs import amid, from_frame, has_geoid_heights, has_place, is_on, to_frame
 from photogram.formats.metadata.merged import (
     WITHOUT,
     Metadata,
@@ -60,14 +61,10 @@ def with_photo_positions(project: Project, options: ReadOptions) -> Project:
     if path is not None:
         metadata = read_gnss_file(path, project.block.photo_ids, directory, mrk_antenna=options.mrk_antenna)
         keys = _keys(project, metadata, weighted_only=True)
-        others = [
-            each
-            for each in project.block.observations
-            if not (isinstance(each, Position) and each.photo in keys)
-        ]
-        messages = list(project.messages)
-        if replaced := len(project.block.observations) - len(others):
-            messages.append(Message(phrase("photos.replaced", n=replaced), path))
+        given, messages = project.block.observations, list(project.messages)
+        others = [each for each in given if not (isinstance(each, Position) and each.photo in keys)]
+        if replaced := len(given) - len(others):
+            messages.append(Message.of("photos.replaced", path, n=replaced))
         if any(each.position and each.position.source == EVENTS for each in metadata.photos.values()):
             code = "photos.events" if antenna else "photos.events-without-lever"
             messages.append(Message.of(code, path))
@@ -89,7 +86,6 @@ def _with_positions(
     option: str,
     antenna: tuple[float, float, float, float] | None = None,
 ) -> Project:
-    """Return a project with positions of the photos in `keys` as observations."""
     records = {name: metadata.photos[key] for name, key in keys.items()}
     there = [name for name, each in records.items() if each.position is not None]
     photos = [name for name in there if records[name].deviations is not None or "gnss" in sd]
@@ -109,12 +105,10 @@ def _with_positions(
     lacks = list(project.lacks)
     if lacking:
         lacks.append(Phrase("read.positions", {"n": lacking, "option": option_sd("gnss")}))
-    inputs = tuple(project.details.get("further inputs", ())) + metadata.tables
-    pictures = tuple(project.details.get("photo pictures", ())) + metadata.pictures
-    read = {"further inputs": inputs, "photo pictures": pictures}
-    project = project.replace(
-        messages=(*project.messages, *messages), lacks=tuple(lacks), details={**project.details, **read}
-    )
+    read = {"further inputs": metadata.tables, "photo pictures": metadata.pictures}
+    read = {name: (*project.details.get(name, ()), *paths) for name, paths in read.items()}
+    details = {**project.details, **read}
+    project = project.replace(messages=(*project.messages, *messages), lacks=tuple(lacks), details=details)
     if not photos:
         return project
     project, xyz, covariances = _in_frame(project, known, photos)
@@ -123,37 +117,24 @@ def _with_positions(
 
 
 def _keys(project: Project, metadata: Metadata, *, weighted_only: bool = False) -> dict[str, str]:
-    """Return the name in the metadata of each photo without observed position.
-
-    If `weighted_only`, only weighted photo positions count as observed.
-    """
+    """Return the names in the metadata of photos without observed, or only without weighted, position."""
     block = project.block
     observed = {each.photo for each in block.observations if isinstance(each, Position) and not weighted_only}
-    weighted = np.flatnonzero(np.isfinite(block.photo_position_sd).any(axis=1)).tolist()
-    observed |= {block.photo_ids[row] for row in weighted}
+    weighted: Bools = np.asarray(np.isfinite(block.photo_position_sd).any(axis=1))
     photos = Photos(metadata.photos)
-    found: dict[str, str] = {}
-    strange = []
-    for name in block.photo_ids:
-        keys = photos.meant(name)
-        if not keys:
-            strange.append(name)
-            continue
+    found = {name: photos.meant(name) for name in block.photo_ids}
+    for name, keys in found.items():
         if len(keys) > 1:
             raise InputError(phrase("photos.ambiguous", photo=name, names=keys), file=metadata.directory)
-        if name not in observed:
-            found[name] = keys[0]
-    if len(strange) == len(block.photo_ids):
-        raise InputError(
-            phrase("photos.none", names=strange, known=list(metadata.photos)), file=metadata.directory
-        )
-    return found
+    if not any(found.values()):
+        fields = {"names": list(found), "known": list(metadata.photos)}
+        raise InputError(phrase("photos.none", **fields), file=metadata.directory)
+    free = (name for name, known in zip(found, weighted, strict=True) if not known and name not in observed)
+    return {name: found[name][0] for name in free if found[name]}
 
 
 def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[Project, Floats, Floats]:
     """Return a georeferenced project, and positions and covariances in its frame."""
-    from photogram.formats.crs import amid, from_frame, has_place
-
     frame = project.frame
     if project.block.linear_unit != "m":
         raise InputError(phrase("photos.metres", unit=project.block.linear_unit), file=project.path)
@@ -172,9 +153,8 @@ def _in_frame(project: Project, known: Located, photos: Sequence[str]) -> tuple[
         if not is_free(project) or np.isfinite(project.block.point_sd).any():
             raise InputError(phrase("photos.place"), file=project.path)
         crs = known.systems[0]
-        frame = Frame(
-            "topocentric", ELLIPSOIDAL, amid(crs, known.xyz[[each == crs for each in known.systems]])
-        )
+        origin = amid(crs, known.xyz[[each == crs for each in known.systems]])
+        frame = Frame("topocentric", ELLIPSOIDAL, origin)
         xyz, covariances, remarks = known.in_frame(frame)
         project = _placed(project, photos, xyz, frame)
     project = project.replace(messages=(*project.messages, *map(Message, remarks)))
@@ -225,17 +205,12 @@ def _observations(
         while taken & {f"{kind.KIND} {name}" for kind in (LeverArm, Shift)}:
             name += "'"
         common[flight] = LeverArm(name, arm, arm_sd), Shift(name, 0.0, SHIFT_SD)
+    levers = [common[group][0] if group and arm_sd else arm for group in groups]
+    shifts = [common[flight][1] if flight else None for flight in known.flights]
+    rows = zip(photos, xyz, covariances, levers, shifts, strict=True)
     return [
-        Position(
-            photo,
-            position,
-            covariance=covariance,
-            lever_arm=common[group][0] if group and arm_sd else arm,
-            shift=common[group][1] if flight else None,
-        )
-        for photo, position, covariance, group, flight in zip(
-            photos, xyz, covariances, groups, known.flights, strict=True
-        )
+        Position(photo, position, covariance=covariance, lever_arm=lever, shift=shift)
+        for photo, position, covariance, lever, shift in rows
     ]
 
 
@@ -272,8 +247,6 @@ class Located:
 
     def in_frame(self, frame: Frame) -> tuple[Floats, Floats, list[Phrase]]:
         """Return (n, 3) positions and (n, 3, 3) covariances in a frame, and remarks."""
-        from photogram.formats.crs import to_frame
-
         turned = covariances_of(self.sd)
         xyz, remarks = np.empty_like(self.xyz), list[Phrase]()
         for crs in dict.fromkeys(self.systems):
@@ -314,8 +287,6 @@ def located(
     if option == GNSS_CRS and crs is None and not any(each.crs for each in said):
         systems = [""] * len(said)
     else:
-        from photogram.formats.crs import is_on
-
         named = [each for each in said if each.crs and each.heights]
         if crs is not None and named and not is_on(crs, _WGS84):
             raise named[0].place.error(phrase("photos.wgs84", crs=crs, option=option))
@@ -326,20 +297,15 @@ def located(
         _check_heights(known, said, systems, option)
     default = np.broadcast_to(np.nan if sd is None else np.asarray(sd, dtype=float), 3)
     deviations = [each.deviations.sd if each.deviations is not None else default for each in known]
-    return Located(
-        tuple(known),
-        tuple(systems),
-        np.array([each.position for each in said], dtype=float).reshape(-1, 3),
-        np.array(deviations, dtype=float).reshape(-1, 3),
-    )
+    positions = [each.position for each in said]
+    xyz, sds = (np.array(own, dtype=float).reshape(-1, 3) for own in (positions, deviations))
+    return Located(tuple(known), tuple(systems), xyz, sds)
 
 
 def _check_heights(
     records: Sequence[PhotoRecord], said: Sequence[Said], systems: Sequence[str], option: str
 ) -> None:
     """Reject heights of different or unknown reference surfaces."""
-    from photogram.formats.crs import has_geoid_heights
-
     surfaces = {
         system: ABOVE[system != ELLIPSOIDAL and has_geoid_heights(system)] if system else _UNKNOWN
         for system in dict.fromkeys(systems)

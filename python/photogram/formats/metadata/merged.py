@@ -58,18 +58,17 @@ class _Sources:
 
     def metadata(self) -> Metadata:
         """Return the record of each photo; the first source with a value has priority."""
-        photos, without_height = {}, []
+        photos, low = {}, []
         for key, sources in self.said.items():
             position = next((each for each in sources if each.is_located), None)
             if position is None and any(each.position is not None for each in sources):
-                without_height.append(key)
+                low.append(key)
             deviations = next((each for each in sources if each.sd is not None), None)
             photos[key] = PhotoRecord(key, self.flights[key], position, deviations)
-        remarks = list(self.messages)
-        if without_height:
-            remark = phrase("photos.heightless", n=len(without_height), names=without_height)
-            remarks.append(Message(remark, self.path))
-        return Metadata(self.path, photos, tuple(self.tables), tuple(self.pictures.values()), tuple(remarks))
+        if low:
+            self.messages.append(Message.of("photos.heightless", self.path, n=len(low), names=low))
+        pictures, remarks = tuple(self.pictures.values()), tuple(self.messages)
+        return Metadata(self.path, photos, tuple(self.tables), pictures, remarks)
 
 
 def _files_of(directory: Path) -> dict[str, Path]:
@@ -87,8 +86,6 @@ def _with_suffix(files: Mapping[str, Path], *suffixes: str) -> dict[str, Path]:
 
 
 class Photos:
-    """Lookup of photos of a folder by relative path or name."""
-
     def __init__(self, keys: Iterable[str]) -> None:
         self._known: tuple[dict[str, list[str]], ...] = ({}, {}, {})
         for key in keys:
@@ -106,11 +103,8 @@ class Photos:
             stems.get(path.stem.casefold()),
             stems.get(path.name.casefold()),  # A name without suffix that contains a dot
         )
-        for keys in tried:
-            inside = [each for each in keys or () if PurePosixPath(each).is_relative_to(folder)]
-            if inside:
-                return inside
-        return []
+        inside = ([key for key in keys or () if PurePosixPath(key).is_relative_to(folder)] for keys in tried)
+        return next(filter(None, inside), [])
 
 
 def _tables(files: Mapping[str, Path], found: _Sources) -> dict[str, Said]:
@@ -134,7 +128,7 @@ def _tables(files: Mapping[str, Path], found: _Sources) -> dict[str, Said]:
                 raise said.place.error(phrase("photos.ambiguous", photo=name, names=keys))
             key = keys[0] if keys else (PurePosixPath(folder) / name).as_posix()
             again[path] += given.setdefault(key, said) is not said
-    found.messages += [Message(phrase("photos.other-table", n=n), path) for path, n in again.items() if n]
+    found.messages += [Message.of("photos.other-table", path, n=n) for path, n in again.items() if n]
     return given
 
 
@@ -142,10 +136,9 @@ def _add_exposures(files: Mapping[str, Path], found: _Sources, *, antenna: bool)
     """Add exposures of .MRK files to the photos of their folders, or of subfolders without such files."""
     exposures = {path: read_exposures(path, antenna=antenna) for path in files.values()}
     found.tables += exposures
-    of_folder: dict[str, list[Path]] = {}
+    of_folder, used = dict[str, list[Path]](), {path: set[int]() for path in exposures}
     for key, path in files.items():
         of_folder.setdefault(PurePosixPath(key).parent.as_posix(), []).append(path)
-    used: dict[Path, set[int]] = {path: set() for path in exposures}
     for key, sources in found.said.items():
         photo = PurePosixPath(key)
         number = number_of(photo.stem)
@@ -171,7 +164,6 @@ def _add_exposures(files: Mapping[str, Path], found: _Sources, *, antenna: bool)
 
 
 def _unused(path: Path, total: int, used: int) -> list[Message]:
-    """Return a message on exposures of a file without a photo."""
     return [Message(phrase("photos.unused", n=total - used, total=total), path)] if used < total else []
 
 
@@ -254,15 +246,12 @@ class Metadata(Documented):
             column("photos", [len(own) for own in flights.values()], "Photos"),
             column("rtk", [sum(each.rtk for each in own) for own in flights.values()], "Of RTK"),
         ]
-        return Document(
-            "Positions of photographs",
-            "",
-            sections=[
-                Section("read", "Read", [Facts("", files)]),
-                Section.of(Table("flights", "Flights", columns)),
-                remarks_section([*self.messages, *remarks_on(located)]),
-            ],
-        )
+        sections = [
+            Section("read", "Read", [Facts("", files)]),
+            Section.of(Table("flights", "Flights", columns)),
+            remarks_section([*self.messages, *remarks_on(located)]),
+        ]
+        return Document("Positions of photographs", "", sections=sections)
 
 
 def counts(sources: Iterable[Said | None]) -> dict[str, int]:
@@ -316,9 +305,8 @@ def read_metadata(directory: str | os.PathLike[str], *, mrk_antenna: bool = Fals
     exposures = _with_suffix(files, EXPOSURES)
     given = _tables(_with_suffix(files, *_TEXTS), found)
     if not (found.pictures or given or exposures):
-        raise InputError(
-            phrase("photos.sources", names=[*ENDINGS, "*_Timestamp.MRK", GEO_TXT]), file=directory
-        )
+        names = [*ENDINGS, "*_Timestamp.MRK", GEO_TXT]
+        raise InputError(phrase("photos.sources", names=names), file=directory)
     for key in dict.fromkeys([*found.pictures, *given]):
         found.said[key] = [given[key]] if key in given else []
         folder = PurePosixPath(key).parent.as_posix()
@@ -334,17 +322,15 @@ def remarks_on(records: Iterable[PhotoRecord]) -> list[Message]:
     fixes: dict[str, list[str]] = {}
     remarks: dict[str, int] = {}
     for each in records:
-        source = each.deviations or each.position
-        if source is not None and source.remark:
-            remarks[source.remark] = remarks.get(source.remark, 0) + 1
-        said = (own.fix for own in (each.deviations, each.position) if own is not None)
-        fix = next((own for own in said if own), FIXED)
+        sources = [source for source in (each.deviations, each.position) if source is not None]
+        for source in sources[:1]:
+            if source.remark:
+                remarks[source.remark] = remarks.get(source.remark, 0) + 1
+        fix = next((source.fix for source in sources if source.fix), FIXED)
         if fix != FIXED:
             fixes.setdefault(fix, []).append(each.photo)
-    found = [
-        Message(phrase("photos.fix", fix=fix, n=len(photos), names=photos)) for fix, photos in fixes.items()
-    ]
-    return found + [Message(phrase("photos.remark", remark=text, n=count)) for text, count in remarks.items()]
+    found = [Message.of("photos.fix", fix=fix, n=len(names), names=names) for fix, names in fixes.items()]
+    return found + [Message.of("photos.remark", remark=text, n=count) for text, count in remarks.items()]
 
 
 MAX_INTERVAL_DIFFERENCE = 2.0  # Seconds; EXIF has whole seconds

@@ -42,13 +42,13 @@ RADIAL = (
 )
 DOP_ALONE = "GPSDOP of EXIF gives no metres: it is not taken"
 DJI, PIX4D = "http://www.dji.com/drone-dji/1.0", "http://pix4d.com/camera/1.0"
-_PROPERTIES = {
-    "position": (DJI, ("GpsLongitude", "GpsLatitude", "AbsoluteAltitude")),
-    "sd": (DJI, ("RtkStdLon", "RtkStdLat", "RtkStdHgt")),
-    "accuracies": (PIX4D, ("GPSXYAccuracy", "GPSXYAccuracy", "GPSZAccuracy")),
-    "angles": (DJI, ("GimbalYawDegree", "GimbalPitchDegree", "GimbalRollDegree")),
-}
-"""Namespaces and names of numbers in XMP packets."""
+_PROPERTIES = (
+    (DJI, ("GpsLongitude", "GpsLatitude", "AbsoluteAltitude")),
+    (DJI, ("RtkStdLon", "RtkStdLat", "RtkStdHgt")),
+    (PIX4D, ("GPSXYAccuracy", "GPSXYAccuracy", "GPSZAccuracy")),
+    (DJI, ("GimbalYawDegree", "GimbalPitchDegree", "GimbalRollDegree")),
+)
+"""Namespaces and names of numbers in XMP packets: position, standard deviations, accuracies and angles."""
 LARGEST = 1 << 20  # Largest size of a packet in bytes; cameras write a few thousand
 _SPELLINGS = {"GpsLongtitude": "GpsLongitude"}  # Spelling of older cameras
 
@@ -171,9 +171,8 @@ def _properties(data: bytes, path: Path) -> dict[tuple[str, str], str]:
     if len(data) > LARGEST:
         raise place.error(phrase("photos.packet", n=len(data), most=LARGEST))
     try:
-        root = ElementTree.fromstring(
-            data.strip(b"\0 \t\r\n"), ElementTree.XMLParser(target=_WithoutDoctype())
-        )
+        parser = ElementTree.XMLParser(target=_WithoutDoctype())
+        root = ElementTree.fromstring(data.strip(b"\0 \t\r\n"), parser)
     except (ElementTree.ParseError, ValueError, LookupError) as error:
         raise place.error(phrase("photos.xmp", reason=str(error))) from None
     found: dict[tuple[str, str], str] = {}
@@ -197,28 +196,18 @@ def said_by_packet(data: bytes, path: Path) -> Said | None:
     properties, place = _properties(data, path), Place(path)
     if not properties:
         return None
-    position, deviations, accuracies, (yaw, pitch, roll) = (
-        [_number(properties, (space, name), place) for name in names] for space, names in _PROPERTIES.values()
-    )
+
+    def number(space: str, name: str) -> float:
+        text = properties.get((space, name))
+        return math.nan if text is None else Place(path, text=f"{name} {text}").number(text, name)
+
+    values = [[number(space, name) for name in names] for space, names in _PROPERTIES]
+    position, deviations, accuracies, (yaw, pitch, roll) = values
     text = properties.get((DJI, "RtkFlag"))
     flag = None if text is None else place.whole(text, "RtkFlag", highest=1000)
     sd = None if flag == 0 else usable_deviations(*deviations)
     rtk = sd is not None or flag not in (None, 0)
-    return Said(
-        "XMP",
-        place,
-        crs=ELLIPSOIDAL if rtk else UNSAID_SYSTEM,
-        heights="" if rtk else UNSAID,
-        position=None if math.isnan(sum(position[:2])) else geographic_position(place, position),
-        sd=sd or usable_deviations(*accuracies),
-        rtk=rtk,
-        flag=flag,
-        angles=None if math.isnan(yaw + pitch + roll) else (yaw, pitch, roll),
-    )
-
-
-def _number(properties: Mapping[tuple[str, str], str], key: tuple[str, str], place: Place) -> float:
-    """Return a property as a number; NaN if it is missing."""
-    if key not in properties:
-        return math.nan
-    return Place(place.file, text=f"{key[1]} {properties[key]}").number(properties[key], key[1])
+    system = (ELLIPSOIDAL, "") if rtk else (UNSAID_SYSTEM, UNSAID)
+    known = None if math.isnan(sum(position[:2])) else geographic_position(place, position)
+    angles = None if math.isnan(yaw + pitch + roll) else (yaw, pitch, roll)
+    return Said("XMP", place, *system, known, sd or usable_deviations(*accuracies), rtk, flag, angles)

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from photogram.formats.cards import filled_lines
-from photogram.formats.column_words import column_of
-from photogram.formats.columns import PLAIN, is_geographic, is_photo, settled
+from photogram.formats.column_words import column_of, is_photo
+from photogram.formats.columns import PLAIN, is_geographic, settled
 from photogram.formats.control import system_of
 from photogram.formats.plain.schema import AXES, TABLES, column_units, deviation_columns
 from photogram.io.delimited import read_columns, read_rows
@@ -116,7 +116,7 @@ def geographic_position(place: Place, values: Sequence[float]) -> Triple | None:
 
 
 _NUMBER = re.compile(r"(?<!\d)\d{4}(?!\d)")
-_NAME = re.compile(r"(.*?)_?Timestamp", re.IGNORECASE)
+_TIME = re.compile(r"_?Timestamp", re.IGNORECASE)
 _NAMED = ("N", "E", "V", "Lat", "Lon", "Ellh", "Q")
 LARGEST_FLAG = 1000
 
@@ -128,9 +128,8 @@ def number_of(stem: str) -> int | None:
 
 
 def prefix_of(path: Path) -> str:
-    """Return the name of a file before its number: the prefix of its photo names."""
-    match = _NAME.match(path.stem)
-    return match[1] if match else path.stem
+    """Return the name of a file before its time: the prefix of its photo names."""
+    return _TIME.split(path.stem)[0]
 
 
 def read_exposures(path: Path, *, antenna: bool) -> dict[int, Said]:
@@ -143,18 +142,18 @@ def read_exposures(path: Path, *, antenna: bool) -> dict[int, Said]:
     """
     found: dict[int, Said] = {}
     for place in filled_lines(path):
-        number, said = _exposure(place, antenna)
-        if number in found:
+        said = _exposure(place, antenna)
+        number = place.whole((place.text or "").split("\t")[0].strip(), "number", highest=10**6)
+        if found.setdefault(number, said) is not said:
             raise place.error(phrase("format.repeated", what="exposure", name=str(number)))
-        found[number] = said
     return found
 
 
-def _exposure(place: Place, antenna: bool) -> tuple[int, Said]:
+def _exposure(place: Place, antenna: bool) -> Said:
     cells = [each.strip() for each in (place.text or "").split("\t")]
     if len(cells) < 11:
         raise place.error(phrase("format.words", n=len(cells), required="11 words between tabs"))
-    number, seconds, week, *rest = cells
+    _, seconds, week, *rest = cells
     if not (week.startswith("[") and week.endswith("]")):
         raise place.error(phrase("photos.week", value=week))
     parts = [[each.strip() for each in cell.split(",")] for cell in rest]
@@ -166,9 +165,8 @@ def _exposure(place: Place, antenna: bool) -> tuple[int, Said]:
     north, east, up = (place.number(each, "standard deviation") for each in accuracies[-1])
     flag = place.whole(named["Q"], "Q", highest=LARGEST_FLAG)
     to_north, to_east, down = (place.number(named[each], each) / 1000 for each in "NEV")
-    position = geographic_position(
-        place, [place.number(named[each], each) for each in ("Lon", "Lat", "Ellh")]
-    )
+    place_of_camera = [place.number(named[each], each) for each in ("Lon", "Lat", "Ellh")]
+    position = geographic_position(place, place_of_camera)
     place.number(seconds, "seconds")
     place.whole(week[1:-1].strip(), "week", highest=10**5)
     if antenna and position is not None:
@@ -181,8 +179,7 @@ def _exposure(place: Place, antenna: bool) -> tuple[int, Said]:
             height - down,
         )
     sd = usable_deviations(east, north, up) if flag else None
-    said = Said(".MRK", place, ELLIPSOIDAL, "", position, sd, rtk=flag != 0, flag=flag)
-    return place.whole(number, "number", highest=10**6), said
+    return Said(".MRK", place, ELLIPSOIDAL, "", position, sd, rtk=flag != 0, flag=flag)
 
 
 SOURCE = "RTKLIB"
@@ -232,23 +229,15 @@ def _event(place: Place, head: Place, heights: str) -> tuple[float, Said]:
     if minutes:
         words = [repr(_degrees(words[:3], place)), repr(_degrees(words[3:6], place)), *words[6:]]
     cells = dict(zip(names, words, strict=False))
-    quality = place.whole(cells.pop("Q"), "Q", highest=9)
+    flag = _FLAGS.get(place.whole(cells.pop("Q"), "Q", highest=9))
     first, second, third, _, *deviations = (place.number(word, name) for name, word in cells.items())
     if geocentric:
         position, (east, north, up) = _geographic((first, second, third), deviations)
     else:
         position, (north, east, up) = (second, first, third), deviations
-    said = Said(
-        SOURCE,
-        place,
-        ELLIPSOIDAL,
-        "" if geocentric else heights,
-        geographic_position(place, position),
-        usable_deviations(east, north, up),
-        rtk=True,
-        flag=_FLAGS.get(quality),
-    )
-    return _seconds(time, place), said
+    heights, known = "" if geocentric else heights, geographic_position(place, position)
+    sd = usable_deviations(east, north, up)
+    return _seconds(time, place), Said(SOURCE, place, ELLIPSOIDAL, heights, known, sd, rtk=True, flag=flag)
 
 
 def _geographic(xyz: Sequence[float], deviations: Sequence[float]) -> tuple[Triple, Triple]:
@@ -277,9 +266,8 @@ def _degrees(words: Sequence[str], place: Place) -> float:
 def _seconds(words: Sequence[str], place: Place) -> float:
     """Return seconds since the first GPS week from date or week."""
     if "/" not in words[0]:
-        return place.whole(words[0], "week", highest=10**5) * SECONDS_OF_WEEK + place.number(
-            words[1], "seconds"
-        )
+        week = place.whole(words[0], "week", highest=10**5)
+        return week * SECONDS_OF_WEEK + place.number(words[1], "seconds")
     try:
         time = datetime.strptime(f"{words[0]} {words[1].partition('.')[0]}", "%Y/%m/%d %H:%M:%S")
     except ValueError:
@@ -316,7 +304,8 @@ def is_reference(path: Path, pictures: Callable[[str], object] | None = None) ->
             rows = map(_cells, head[k + 1 :])
             photos = [cells[column] for cells in rows if len(cells) > column]
             unnamed = names[column] == "label" and pictures is None
-            return unnamed or any(_is_picture(each) or (pictures and pictures(each)) for each in photos)
+            own = (each.lower().endswith(ENDINGS) or (pictures and pictures(each)) for each in photos)
+            return unnamed or any(own)
     first = next((line for line in head if not line.startswith("#") and len(_cells(line)) > 1), "")
     if not _is_row(first):
         return False
@@ -339,14 +328,10 @@ def _header(line: str) -> list[str] | None:
     return own if set(_REQUIRED) <= set(PLAIN.spelled(_KNOWN, own)) else None
 
 
-def _is_picture(name: str) -> bool:
-    return name.lower().endswith(ENDINGS)
-
-
 def _is_row(line: str) -> bool:
     """Return whether a line is a Pix4D row: a photo, and its numbers."""
     name, *numbers = _cells(line)
-    if not _is_picture(name) or len(numbers) not in _PIX4D:
+    if not name.lower().endswith(ENDINGS) or len(numbers) not in _PIX4D:
         return False
     try:
         return all(math.isfinite(finite_number(each)) for each in numbers)
@@ -372,25 +357,18 @@ def read_reference(path: Path, messages: list[Message]) -> dict[str, Said]:
         table = read_columns(path, known=_KNOWN, numbers=_NUMBERS, spelling=partial(PLAIN.spelled, _KNOWN))
         angular = is_geographic(table)
     table = settled(table, PLAIN, _KNOWN, column_units("gnss"), _REQUIRED, (), REFERENCE, messages)
-    unsaid = angular and not crs
     used, xyz = table.flags("enabled"), table.vectors(AXES)
     common, sd = (table.vectors(names, infinite=True) for names in (("sd",), deviation_columns(AXES)))
     sd = np.where(np.isnan(sd), common, sd)
+    system = (UNSAID_SYSTEM, UNSAID) if angular and not crs else (crs, "")
     found: dict[str, Said] = {}
     for row, name in enumerate(table.names_once("photo")):
-        x, y, z = xyz[row].tolist()
+        (x, y, z), place = xyz[row].tolist(), table.place(row)
         position = None if math.isnan(x) or math.isnan(y) else (x, y, z)
         if angular and position is not None:
-            position = geographic_position(table.place(row), position)
+            position = geographic_position(place, position)
         if used[row]:
-            found[name] = Said(
-                REFERENCE,
-                table.place(row),
-                crs=UNSAID_SYSTEM if unsaid else crs,
-                heights=UNSAID if unsaid else "",
-                position=position,
-                sd=usable_deviations(*sd[row].tolist()),
-            )
+            found[name] = Said(REFERENCE, place, *system, position, usable_deviations(*sd[row].tolist()))
     return found
 
 
@@ -415,13 +393,8 @@ def read_geo_txt(path: Path) -> dict[str, Said]:
             raise place.error(phrase("format.words", n=count, required=required))
         values = [place.number(word) for word in words[:8]] + [math.nan] * (8 - len(words))
         x, y, z, yaw, pitch, roll, horizontal, vertical = values
-        geographic = crs in (ELLIPSOIDAL, UNSAID_SYSTEM)
-        found[name] = Said(
-            GEO_TXT,
-            place,
-            crs,
-            position=geographic_position(place, (x, y, z)) if geographic else (x, y, z),
-            sd=usable_deviations(horizontal, horizontal, vertical),
-            angles=None if count < 7 else (yaw, pitch, roll),
-        )
+        sd, position = usable_deviations(horizontal, horizontal, vertical), (x, y, z)
+        known = geographic_position(place, position) if crs in (ELLIPSOIDAL, UNSAID_SYSTEM) else position
+        angles = None if count < 7 else (yaw, pitch, roll)
+        found[name] = Said(GEO_TXT, place, crs, position=known, sd=sd, angles=angles)
     return found
