@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,7 +16,7 @@ from photogram.formats.plain.schema import CURVES, DEVICE, GRID, TABLES, deviati
 from photogram.formats.plain.tables import Tables, columns_of, made
 from photogram.formats.plain.unknowns import Covariances
 from photogram.io.column_table import ColumnTable
-from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
 from photogram.network.films import (
     Film,
@@ -63,17 +62,14 @@ class Machine:
         return Machine(self.scanner.replace(sd=0.0), curves, self.readings, None)
 
 
-@dataclass(frozen=True)
-class FilmKind:
+class FilmKind(NamedTuple):
     """A row of the table of films: its roll, and priors of its films."""
 
     roll: Roll
     model: str
     sd_size: tuple[float, float, float]
-    sd_bend: tuple[float, float]
-    pattern: Pattern | None
-    reseau: Callable[..., Reseau] | None = None
-    """Function that returns the pattern of a photo from its name and known shifts."""
+    sd_bend: tuple[float, ...]
+    pattern: Callable[[str], Pattern | None] = lambda _: None  # Of a photo, by its name
 
 
 def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine]:
@@ -81,39 +77,28 @@ def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine
     table, found = tables.rows("scanners"), {}
     for row, given in enumerate(tables.records("scanners")):
         name, cells = given["scanner"], TABLES["scanners"].defaults | given
+        # Origin of the polynomials, mm from the origin of readings, and covariance of all numbers
+        zero, covariance = np.zeros(2), None
         if "calibration" in given:
             for column in (*_NUMBERS, "hx", "hy", *deviation_columns(_NUMBERS)):
                 if column in given:
                     raise table.cell_error(row, column, "plain.calibrated-scanner", scanner=name)
             if covariances.names("scanner", name):
                 raise table.error(row, phrase("plain.scanner-covariance", scanner=name))
-            numbers = _calibrated(table.path.parent / given["calibration"], tables.messages)
-        else:
-            columns = _NUMBERS, deviation_columns(_NUMBERS), ("hx", "hy")
-            numbers = _Numbers(*(np.array([cells[each] for each in names]) for names in columns))
+            path = table.path.parent / given["calibration"]
+            calibrated, zero, covariance = _calibrated(path, tables.messages)
+            cells |= calibrated
         # Readings count rows downwards by default.
         pitch, *origin, down = *(cells[each] for each in _READINGS[1:]), cells.get("rows_down", True)
-        zero = numbers.zero / pitch * [1.0, -1.0 if down else 1.0] + origin
-        counted = pitch, tuple(zero.tolist()), down, tuple(numbers.half.tolist())
-        readings = made(table, row, Readings, *counted)
-        found[name] = _machine(table, row, name, numbers, readings, covariances)
+        zero = zero / pitch * [1.0, -1.0 if down else 1.0] + origin
+        half = cells["hx"], cells["hy"]
+        readings = made(table, row, Readings, pitch, tuple(zero.tolist()), down, half)
+        found[name] = _machine(table, row, cells, readings, covariance, covariances)
     return found
 
 
-@dataclass(frozen=True)
-class _Numbers:
-    """Sx, Sy, alpha and 18 coefficients of a scanner (mm), and their prior."""
-
-    values: Floats  # (21,) values; those with a covariance are estimated
-    sd: Floats
-    half: Floats  # (2,) half ranges of the polynomials, mm
-    # (2,) origin of the polynomials, mm from the origin of readings
-    zero: Floats = field(default_factory=lambda: np.zeros(2))
-    covariance: Floats | None = None  # (21, 21); None without
-
-
-def _calibrated(path: Path, messages: list[Message]) -> _Numbers:
-    """Return the contents of a comparator calibration file, or of its correction.
+def _calibrated(path: Path, messages: list[Message]) -> tuple[dict[str, float], Floats, Floats]:
+    """Return cells, origin and covariance (mm) of a comparator calibration file, or of its correction.
 
     Fixed components of a singular covariance matrix get a standard deviation of 0.001 um.
     """
@@ -131,44 +116,50 @@ def _calibrated(path: Path, messages: list[Message]) -> _Numbers:
     if known.any() and not is_covariance(part):
         covariance = covariance + np.diag(np.where(known, KNOWN**2, 0.0))
         messages.append(Message(phrase("plain.singular-scanner", sd=KNOWN), path))
+    cells = columns_of(_NUMBERS, values) | columns_of(("hx", "hy"), np.array(frame.half_range_um) * UM)
+    cells |= columns_of(deviation_columns(_NUMBERS), np.where(known, np.inf, 0.0))
     zero = np.asarray(np.linalg.solve(own.matrix, frame.centre_um), dtype=float) * UM
-    return _Numbers(
-        values, np.where(known, np.inf, 0.0), np.array(frame.half_range_um) * UM, zero, covariance
-    )
+    return cells, zero, covariance
 
 
 def _machine(
-    table: ColumnTable, row: int, name: str, numbers: _Numbers, readings: Readings, covariances: Covariances
+    table: ColumnTable,
+    row: int,
+    cells: Mapping[str, Any],
+    readings: Readings,
+    calibrated: Floats | None,
+    covariances: Covariances,
 ) -> Machine:
     """Return a scanner with its curves, if any, and their joint prior."""
-    words, named = [word.lower() for word in _WORDS], covariances.names("scanner", name)
+    name, words = cells["scanner"], [word.lower() for word in _WORDS]
+    values, sd = (
+        np.array([cells[each] for each in names]) for names in (_NUMBERS, deviation_columns(_NUMBERS))
+    )
+    named = covariances.names("scanner", name)
+    if calibrated is not None:
+        named = {word for word, free in zip(words, np.isinf(sd), strict=True) if free}
     # By the index of the first of their three numbers
     parts: dict[int, tuple[type[Unknown], str]] = {0: (Scanner, name)}
-    if numbers.values[3:].any() or numbers.sd[3:].any() or named - set(words[:3]):
+    if values[3:].any() or sd[3:].any() or named - set(words[:3]):
         parts |= {3 * k: (ScannerCurve, f"{name} {k}") for k in range(1, 7)}
-    sd = numbers.sd.copy()
-    if numbers.covariance is not None:
-        joined = [at for at in parts if np.isinf(sd[at])]
-    else:
-        # A covariance matrix contains all three parameters of an unknown, or none.
-        joined = [at for at in parts if named & set(words[at : at + 3])] or [0] * bool(named)
+    # A covariance matrix contains all three parameters of an unknown, or none.
+    joined = [at for at in parts if named & set(words[at : at + 3])] or [0] * bool(named)
     rows = [at + k for at in joined for k in range(3)]
     sd[rows] = np.inf
-    unknowns: dict[int, Unknown] = {
-        at: made(table, row, kind, title, numbers.values[at : at + 3], sd[at : at + 3])
+    unknowns: dict[int, Any] = {
+        at: made(table, row, kind, title, values[at : at + 3], sd[at : at + 3])
         for at, (kind, title) in parts.items()
     }
-    if numbers.covariance is None:
-        covariance = covariances.over("scanner", name, [words[k] for k in rows])
-    else:
-        covariance = numbers.covariance[np.ix_(rows, rows)] if rows else None
     known = None
-    if covariance is not None:
+    if joined:
+        if calibrated is None:
+            covariance = covariances.over("scanner", name, [words[k] for k in rows])
+        else:
+            covariance = calibrated[np.ix_(rows, rows)]
         together = [unknowns[at] for at in joined]
         known = made(table, row, KnownTogether, "scanner", together, covariance=covariance)
     scanner, *curves = unknowns.values()
-    assert isinstance(scanner, Scanner)
-    return Machine(scanner, tuple(each for each in curves if isinstance(each, ScannerCurve)), readings, known)
+    return Machine(scanner, tuple(curves), readings, known)
 
 
 def machines_of(films: Iterable[Film], together: Iterable[KnownTogether]) -> dict[str, Machine]:
@@ -203,52 +194,38 @@ def read_films(tables: Tables, names: Sequence[str], default: str) -> Mapping[st
     found = {name: _film_kind(name, defaults) for name in names}
     for row, given in enumerate(tables.records("films")):
         cells = defaults | given
-        found[cells["film"]] = kind = made(table, row, _film_kind, cells["film"], cells)
-        if cells["pattern"] == LOCAL:
-            numbers = *_pattern_numbers(table, row, cells, GRID, 2), cells.get("sd_smooth", math.inf)
-            found[cells["film"]] = replace(kind, reseau=partial(_reseau, table, row, numbers))
-        elif cells["pattern"] != "none":
-            found[cells["film"]] = replace(kind, pattern=_pattern(table, row, cells))
+        kind = made(table, row, _film_kind, cells["film"], cells)
+        found[cells["film"]] = kind._replace(pattern=_pattern(table, row, cells))
     return found
 
 
 def _film_kind(name: str, cells: Mapping[str, Any]) -> FilmKind:
-    """Return the priors of a film without a pattern."""
-    bends = [cells[f"sd_{each}"] for each in BENDS.get(cells["model"], ())]
-    roll = Roll(name, cells["m"], cells["sd_m"])
+    bends = tuple(cells[f"sd_{each}"] for each in BENDS.get(cells["model"], ()))
     size = cells["sd_photo_m"], cells["sd_b1"], cells["sd_b2"]
-    return FilmKind(roll, cells["model"], size, (bends[0], bends[1]) if bends else (0.0, 0.0), None)
+    return FilmKind(Roll(name, cells["m"], cells["sd_m"]), cells["model"], size, bends)
 
 
-def _pattern(table: ColumnTable, row: int, cells: Mapping[str, Any]) -> Pattern:
+def _pattern(table: ColumnTable, row: int, cells: Mapping[str, Any]) -> Callable[[str], Pattern | None]:
+    """Return the pattern of photos by name: one for all of a film, or a separate grid for each."""
     kind, film = cells["pattern"], cells["film"]
-    count = 10 if kind == "ebner" else 2
-    names = GRID if kind == "grid" else ("half_format_mm",)
-    values, sd = _pattern_numbers(table, row, cells, names, count)
-    if kind == "grid":
-        nodes = int(values[4]) * int(values[5])
-        own = [Weights(f"{film} node {k}", 0.0, sd) for k in range(1, nodes + 1)]
-    else:
-        own = [Weights(film if count == 2 else f"{film} {k}", 0.0, sd[k : k + 2]) for k in range(0, count, 2)]
-    return made(table, row, Pattern, kind, values, own)
-
-
-def _reseau(
-    table: ColumnTable, row: int, numbers: Sequence[Any], photo: str, shifts: Floats | None = None
-) -> Reseau:
-    free = made(table, row, Reseau, photo, *numbers)
-    return free if shifts is None else free.with_shifts(shifts)
-
-
-def _pattern_numbers(
-    table: ColumnTable, row: int, cells: Mapping[str, Any], columns: Sequence[str], count: int
-) -> list[Floats]:
-    """Return the numbers of a pattern and standard deviations of its weights."""
-    weights = [f"sd_w{k}" for k in range(1, count + 1)]
-    for column in (*columns, *weights):
+    if kind == "none":
+        return lambda _: None
+    names = GRID if kind in ("grid", LOCAL) else ("half_format_mm",)
+    weights = [f"sd_w{k}" for k in range(1, 11 if kind == "ebner" else 3)]
+    for column in (*names, *weights):
         if column not in cells:
-            raise table.cell_error(row, column, "plain.pattern", pattern=cells["pattern"])
-    return [np.array([cells[column] for column in own]) for own in (columns, weights)]
+            raise table.cell_error(row, column, "plain.pattern", pattern=kind)
+    values, sd = (np.array([cells[column] for column in own]) for own in (names, weights))
+    if kind == LOCAL:
+        smooth = cells.get("sd_smooth", math.inf)
+        return lambda photo: made(table, row, Reseau, photo, values, sd, smooth)
+    if kind == "grid":
+        own = [Weights(f"{film} node {k}", 0.0, sd) for k in range(1, int(values[4]) * int(values[5]) + 1)]
+    else:
+        titles = [film] if len(sd) == 2 else [f"{film} {k}" for k in range(0, len(sd), 2)]
+        own = [Weights(title, 0.0, pair) for title, pair in zip(titles, sd.reshape(-1, 2), strict=True)]
+    pattern = made(table, row, Pattern, kind, values, own)
+    return lambda _: pattern
 
 
 def film_cells(film: Film, roll: Roll | None, sd: Mapping[str, float | None]) -> dict[str, Any]:
