@@ -52,12 +52,14 @@ def read_certificates(tables: Tables) -> dict[str, Certificate]:
         if file and files.setdefault(camera, table.path.parent / file) != table.path.parent / file:
             fields = {"camera": camera, "certificate": files[camera].name}
             raise table.cell_error(row, "certificate", "plain.other-certificate", **fields)
-    several = {camera: [_read(path, camera)] for camera, path in files.items()}
-    several |= _of_settings(tables, [camera for camera in flown if camera not in files])
-    if not several:
-        return {}
-    from photogram.film.years import age_remark, changed_remark  # imported on demand
+    from photogram.film import Certificate  # imported on demand
+    from photogram.film.years import age_remark, changed_remark
 
+    several = {
+        camera: [Certificate.read(path, None if path.suffix.lower() == ".toml" else camera)]
+        for camera, path in files.items()
+    }
+    several |= _of_settings(tables, [camera for camera in flown if camera not in files])
     certificates = {camera: _valid(table, camera, own, flown[camera]) for camera, own in several.items()}
     for camera, own in certificates.items():
         remarks: list[str | Phrase] = list(own.told())
@@ -79,40 +81,32 @@ def _valid(
     """Return the certificate of a camera that is valid on all of its flight dates."""
     from photogram.film.years import valid_certificate
 
-    found: Certificate | None = None
+    found: list[Certificate] = []
     for day, row in flown.items():
         try:
-            own = valid_certificate(several, day)
-        except ContradictionError:
-            raise
+            found.append(valid_certificate(several, day))
         except InputError as error:
-            if error.file:
+            if error.file or isinstance(error, ContradictionError):
                 raise
             message = phrase("error.at", what=f"camera {camera}", message=message_of(error))
             raise table.error(row, message) from None
-        if found is not None and own is not found:
-            fields = {"camera": camera, "first": str(found.day), "second": str(own.day), "day": str(day)}
-            raise table.error(row, phrase("plain.two-certificates", **fields))
-        found = own
-    assert found is not None
-    return found
-
-
-def _read(path: Path, camera: str) -> Certificate:
-    from photogram.film import Certificate
-
-    return Certificate.read(path, None if path.suffix.lower() == ".toml" else camera)
+        if found[-1] is not found[0]:
+            fields = {"camera": camera, "first": str(found[0].day), "second": str(found[-1].day)}
+            raise table.error(row, phrase("plain.two-certificates", day=str(day), **fields))
+    return found[0]
 
 
 def _of_settings(tables: Tables, cameras: Sequence[str]) -> dict[str, list[Certificate]]:
     """Return the certificates of a project by camera: of the only camera, or by name."""
+    from photogram.film import Certificate
+
     found: dict[str, list[Certificate]] = {}
     for path in tables.settings.certificates:
         if path.suffix.lower() != ".toml":
             for camera in cameras:
-                found.setdefault(camera, []).append(_read(path, camera))
+                found.setdefault(camera, []).append(Certificate.read(path, camera))
             continue
-        own = _read(path, "")
+        own = Certificate.read(path)
         if own.name not in cameras and len(cameras) != 1:
             message = phrase("plain.certificate-camera", camera=own.name, names=list(cameras))
             raise InputError(message, file=tables.settings.path)
@@ -217,19 +211,17 @@ def marks_of(
     readings: Iterable[Fiducial], together: Iterable[KnownTogether], camera_of: Mapping[str, str]
 ) -> dict[str, Marks]:
     """Return the marks of readings by camera name, with their priors, from the cameras of photos."""
-    cameras: dict[int, str] = {}
-    read: dict[int, Mark] = {}
+    cameras: dict[Mark, str] = {}
     for each in readings:
         camera = camera_of[each.photo]
-        if cameras.setdefault(id(each.mark), camera) != camera:
+        if cameras.setdefault(each.mark, camera) != camera:
             raise InputError(phrase("plain.mark-of-cameras", name=each.mark.name))
-        read[id(each.mark)] = each.mark
-    found: dict[str, Marks] = {}
+    others, found = dict(cameras), dict[str, Marks]()
     for known in together:
         marks = [each for each in known.joined if isinstance(each, Mark)]
         if not marks:
             continue
-        of = {cameras[id(mark)] for mark in marks if id(mark) in cameras}
+        of = {cameras[mark] for mark in marks if mark in cameras}
         if len(of) != 1 or len(marks) < len(known.joined):
             raise InputError(phrase("plain.known-marks", name=known.name))
         (camera,) = of
@@ -242,14 +234,12 @@ def marks_of(
             own.covariance = known.precision
         else:
             own.sd[names[0]] = np.sqrt(np.diag(known.precision))
-        for mark in marks:
-            read.pop(id(mark), None)
+        others = {mark: camera for mark, camera in others.items() if mark not in marks}
     # The only prior of other marks is their own standard deviation.
-    for key, mark in read.items():
-        own = found.setdefault(cameras[key], Marks(cameras[key]))
-        sd = mark.deviations
+    for mark, camera in others.items():
+        own, sd = found.setdefault(camera, Marks(camera)), mark.deviations
         if own.covariance is not None or not (np.isfinite(sd).all() and (sd > 0).all()):
-            raise InputError(phrase("plain.no-certificate", mark=mark.name, camera=cameras[key]))
-        name = mark.name.removeprefix(f"{cameras[key]} ")
+            raise InputError(phrase("plain.no-certificate", mark=mark.name, camera=camera))
+        name = mark.name.removeprefix(f"{camera} ")
         own.marks[name], own.sd[name] = mark, sd
     return found

@@ -329,9 +329,7 @@ class WrittenFilms:
         together = [each for each in observations if isinstance(each, KnownTogether)]
         self.machines = machines_of(self.films.values(), together)
         self.certificates = marks_of(self.readings, together, camera_of)
-        self.by_mark = {
-            id(mark): name for own in self.certificates.values() for name, mark in own.marks.items()
-        }
+        self.by_mark = {mark: name for own in self.certificates.values() for name, mark in own.marks.items()}
         self._rolls = {
             photo: self.known[photo].roll if film.roll is None and photo in self.known else film.roll
             for photo, film in self.films.items()
@@ -348,7 +346,7 @@ class WrittenFilms:
         if any(each.precision[0, 1] for each in self.readings):
             raise InputError(phrase("plain.correlated-readings"))
         readings = (
-            {"photo": each.photo, "fiducial": self.by_mark[id(each.mark)]}
+            {"photo": each.photo, "fiducial": self.by_mark[each.mark]}
             | columns_of(names, each.observed[:2])
             | columns_of(deviation_columns(names), np.sqrt(np.diag(each.precision)))
             for each in self.readings

@@ -43,8 +43,6 @@ class Photos:
     matrices: Floats
     position_sd: Floats
     attitude_sd: Floats
-    groups: list[str]
-    times: Floats
     unused: frozenset[str]
     observed: list[Observation | Observations[Any]]
 
@@ -62,10 +60,8 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     flown = np.array([bool(each) for each in table.texts("trajectory")], dtype=bool)
     sd = tables.deviations(table, "photos", SD_AXES, math.inf)
     sd[flown] = table.vectors(SD_AXES, math.inf, infinite=True)[flown]
-    weighted = np.isfinite(sd) & np.isnan(centres)
-    if weighted.any():
-        row, axis = np.argwhere(weighted)[0].tolist()
-        raise table.cell_error(row, f"sd_{AXES[axis]}", "plain.sd-alone", value=AXES[axis])
+    for row, axis in np.argwhere(np.isfinite(sd) & np.isnan(centres))[:1].tolist():
+        raise table.cell_error(row, SD_AXES[axis], "plain.sd-alone", value=AXES[axis])
     if "photos" in tables.settings.crs and np.isfinite(sd).any():
         raise table.head.error(phrase("plain.sd-with-crs"))
     centres, _ = transform.positions("photos", centres, None, table)
@@ -85,8 +81,6 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
         matrices,
         sd,
         attitude_sd,
-        table.texts("group"),
-        table.numbers("time"),
         unused,
         list(made_of_rows(table, Attitude, observed)),
     )
@@ -97,11 +91,28 @@ def cameras_of(table: ColumnTable, names: Sequence[str]) -> list[int]:
     only = names[0] if len(names) == 1 else ""
     if "camera" not in table and not only:
         raise table.head.error(phrase("plain.which-camera", count=len(names)))
-    places = {name: row for row, name in enumerate(names)}
     texts = table.texts("camera", only)
-    if (row := next((row for row, name in enumerate(texts) if name not in places), None)) is not None:
-        raise table.unknown_error(row, "camera", "camera", texts[row], places)
+    for row in (row for row, name in enumerate(texts) if name not in names):
+        raise table.unknown_error(row, "camera", "camera", texts[row], names)
+    places = {name: row for row, name in enumerate(names)}
     return [places[name] for name in texts]
+
+
+def spread_over_photos(cameras: Cameras, photos: Photos) -> tuple[Cameras, list[int]]:
+    """Create separate cameras for photos or groups as in the table."""
+    if all(each.for_each == "all" for each in cameras.rows):
+        return cameras, photos.cameras
+    places: dict[tuple[int, str], int] = {}
+    of_photos, groups = [], photos.table.texts("group")
+    for row, photo, group in zip(photos.cameras, photos.names, groups, strict=True):
+        own = {"all": "", "photo": photo}.get(cameras.rows[row].for_each, group)
+        of_photos.append(places.setdefault((row, own), len(places)))
+    rows = []
+    for row, own in places:
+        camera = cameras.rows[row].camera
+        camera = camera.replace(name=f"{camera.name}/{own}") if own else camera
+        rows.append(cameras.rows[row]._replace(camera=camera))
+    return cameras._replace(rows=rows), of_photos
 
 
 def _attitude_weights(
@@ -115,8 +126,7 @@ def _attitude_weights(
     if not any(each in table for each in columns):
         return free, {}
     sd = tables.angles(table, columns, math.inf, infinite=True)
-    if (sd < 0).any():
-        row = int(np.argwhere(sd < 0)[0][0])
+    for row in np.argwhere(sd < 0)[:1, 0].tolist():
         raise table.error(row, phrase("plain.negative-angle-sd", value=float(sd[row].min())))
     unknown = np.isfinite(sd).any(axis=1) & np.isnan(matrices).any(axis=(1, 2))
     check_rows(table, unknown, phrase("plain.no-angles"))
@@ -184,14 +194,9 @@ def images_of(tables: Tables, table: ColumnTable, photos: Photos) -> Images:
 def _some(images: Images, which: Bools) -> Images:
     """Return selected image observations, and the names of their points only."""
     seen, points = np.unique(images.points[which], return_inverse=True)
-    return Images(
-        images.sd_given,
-        images.photos[which],
-        points.reshape(-1),
-        [images.point_names[row] for row in seen.tolist()],
-        images.xy[which],
-        None if images.sd is None else images.sd[which],
-    )
+    names = [images.point_names[row] for row in seen.tolist()]
+    sd = None if images.sd is None else images.sd[which]
+    return Images(images.sd_given, images.photos[which], points.reshape(-1), names, images.xy[which], sd)
 
 
 def _image_sd(tables: Tables, table: ColumnTable, *, given: bool) -> Floats | None:
@@ -207,9 +212,7 @@ def _image_sd(tables: Tables, table: ColumnTable, *, given: bool) -> Floats | No
         return None
     if "level" in table and not own and "sd" not in table:
         found = found * 2.0 ** table.numbers("level", 0.0)[:, np.newaxis]
-    bad = np.argwhere(~((found > 0) & np.isfinite(found)))
-    if len(bad):
-        row = int(bad[0][0])
+    for row in np.argwhere(~((found > 0) & np.isfinite(found)))[:1, 0].tolist():
         raise table.error(row, phrase("plain.image-sd", value=found[row].tolist()))
     return found
 
@@ -305,13 +308,13 @@ def _with_halves(table: ColumnTable, seams: Seams) -> ColumnTable:
     more = [row for row, name in enumerate(texts) if name in seams]
     halves, count = [seams[texts[row]].half for row in more], table.count
     found = table.some([*range(count), *more]).with_texts("photo", [*texts, *halves])
-    deviations = {
-        name: np.where(np.arange(found.count) < count, own, np.nan)
-        if isinstance(own := found.cells[name], np.ndarray)
-        else [*table.texts(name), *[""] * len(more)]
-        for name in (each for each in table.columns if each.startswith("sd_"))
-    }
-    return replace(found, cells={**found.cells, **deviations})
+    cells = dict(found.cells)
+    for name in (each for each in table.columns if each.startswith("sd_")):
+        if isinstance(own := cells[name], np.ndarray):
+            cells[name] = np.where(np.arange(found.count) < count, own, np.nan)
+        else:
+            cells[name] = [*table.texts(name), *[""] * len(more)]
+    return replace(found, cells=cells)
 
 
 def mounted_halves(

@@ -15,7 +15,7 @@ from photogram.formats.builder import BlockBuilder
 from photogram.formats.names import NamedValues
 from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, read_boards
-from photogram.formats.plain.cameras import read_cameras, spread_over_photos
+from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.films import on_film, read_scanned
 from photogram.formats.plain.observations import Known, read_observations
 from photogram.formats.plain.photos import (
@@ -24,6 +24,7 @@ from photogram.formats.plain.photos import (
     images_of,
     mounted_halves,
     read_photos,
+    spread_over_photos,
     with_seams,
 )
 from photogram.formats.plain.rigs import placed, read_frames, read_rigs, read_timed, times_of
@@ -79,7 +80,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     places, control_rows, known = _add_points(block, tables, transform, images, given)
     scanned = read_scanned(tables, images, known, photos, cameras, covariances)
     cameras = on_film(cameras, photos, scanned, tables.messages)
-    cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
+    cameras, photo_cameras = spread_over_photos(cameras, photos)
     source = ImageSource(tables, photos, cameras, np.asarray(photo_cameras), scanned.photos)
     xy, sd = source.converted(images)
     for row, own in enumerate(cameras.rows):
@@ -91,7 +92,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     block.rigs(read_frames(tables, rigs, photos.names, photos.taken), owners)
     block.mounts = mounted_halves(seams, block.mounts, timed, photos.names)
     photo_rows = {name: row for row, name in enumerate(photos.names)}
-    known_objects = Known(places, photo_rows, photos.times.tolist(), trajectories)
+    known_objects = Known(places, photo_rows, photos.table.numbers("time").tolist(), trajectories)
     observations = Observations.of(read_observations(tables, transform, known_objects, rigs))
     boards, bends, regularise = read_boards(tables)
     if trajectories and transform.frame != settings.frame:

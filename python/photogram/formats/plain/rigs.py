@@ -240,7 +240,7 @@ def read_timed(
     )
     found: list[Timed] = []
     for row, (name, camera, time) in enumerate(
-        zip(photos.names, photos.cameras, photos.times.tolist(), strict=True)
+        zip(photos.names, photos.cameras, table.numbers("time").tolist(), strict=True)
     ):
         rig, sensor, clock = on_rigs[row], None, clocks[row]
         if rig is None and as_sensors[row]:

@@ -213,23 +213,15 @@ class Schema:
         return next(part for part in self.unknowns if part.field == field)
 
     @cached_property
-    def required(self) -> tuple[str, ...]:
-        """Required columns."""
-        columns = (column for column in self.all_columns if column.default == REQUIRED)
-        return tuple(name for column in columns for name in column.components)
-
-    @cached_property
-    def texts(self) -> tuple[str, ...]:
-        """Allowed columns of names and words."""
-        return self._names(text=True)
+    def columns(self) -> tuple[str, ...]:
+        """All allowed columns; numbers are last."""
+        texts = [name for column in self.all_columns if column.kind in TEXTS for name in column.names]
+        return (*dict.fromkeys(texts), *self.numbers)
 
     @cached_property
     def numbers(self) -> tuple[str, ...]:
         """Allowed columns of numbers."""
-        return self._names(text=False)
-
-    def _names(self, *, text: bool) -> tuple[str, ...]:
-        columns = [column for column in self.all_columns if (column.kind in TEXTS) is text]
+        columns = (column for column in self.all_columns if column.kind not in TEXTS)
         return tuple(dict.fromkeys(name for column in columns for name in column.names))
 
     @cached_property
@@ -248,15 +240,12 @@ class Schema:
         columns = (column for column in self.all_columns if column.words)
         return {name: column.words for column in columns for name in column.names}
 
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """All allowed columns."""
-        return self.texts + self.numbers
-
     def needed(self, there: Collection[str]) -> tuple[str, ...]:
         """Return the required columns of a table that has some columns."""
         of_trajectories = "trajectory" in there and self.class_name
-        return tuple(name for name in self.required if name != "photo" or not of_trajectories)
+        columns = (column for column in self.all_columns if column.default == REQUIRED)
+        names = (name for column in columns for name in column.components)
+        return tuple(name for name in names if name != "photo" or not of_trajectories)
 
 
 def _declared() -> Iterator[tuple[str, Schema]]:
