@@ -102,8 +102,6 @@ SMALLEST_DISTANCE = 0.1  # Smallest principal distance, relative to the image wi
 
 
 class TableCamera(NamedTuple):
-    """A camera with the further cells of its row."""
-
     camera: Camera
     size: Size | None
     pixel_mm: float | None
@@ -121,12 +119,10 @@ class Cameras(NamedTuple):
 
     @property
     def cameras(self) -> list[Camera]:
-        """The cameras."""
         return [each.camera for each in self.rows]
 
 
 def read_cameras(tables: Tables) -> Cameras:
-    """Read the table of cameras."""
     table = tables.read("cameras")
     if table is None:
         raise InputError(phrase("error.missing", name="cameras.csv"), file=tables.settings.path)
@@ -178,7 +174,6 @@ class _Row:
             self.values = {name: value for name, value in self.values.items() if name not in OF_LINES}
 
     def _line_sensor(self) -> LineSensor | None:
-        """Return the line sensor; None for frame cameras."""
         table, row, cells = self.table, self.row, self.cells
         pitches = [cells.get(name, 0.0) for name in _PITCH]
         if not cells.keys() & set(_PITCH):
@@ -194,7 +189,6 @@ class _Row:
         return LineSensor((pitch[0], pitch[1]), cells.get("s0", cells.get("width", 0) / 2), x0, y0)
 
     def shutter(self, camera: Camera) -> Shutter | None:
-        """Return the rolling shutter; None without."""
         table, row, cells, settings = self.table, self.row, self.cells, self.tables.settings
         if "readout" not in cells:
             if cells.keys() & {"readout_direction", "shutter"} or cells.get("sd_readout"):

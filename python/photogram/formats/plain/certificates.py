@@ -31,7 +31,6 @@ SD_MARK = 0.002  # Default (mm) for positions in a certificate, which are printe
 
 
 def read_certificates(tables: Tables) -> dict[str, Certificate]:
-    """Return the certificates of cameras by camera name."""
     table = tables.read("photos")
     if table is None or (not tables.settings.certificates and "certificate" not in table):
         return {}
@@ -119,7 +118,6 @@ def _of_settings(tables: Tables, cameras: Sequence[str]) -> dict[str, list[Certi
 
 
 def certified(tables: Tables, name: str, model: str, own: Certificate) -> Camera:
-    """Return the camera of a certificate."""
     if (chosen := model or _MODELS[0]) not in _MODELS:
         fields = {"camera": name, "model": chosen, "models": list(_MODELS)}
         raise InputError(phrase("plain.certificate-model", **fields), file=own.file)
@@ -170,7 +168,6 @@ class Marks:
         ]
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """Yield the rows of the table of marks."""
         for name, mark in self.marks.items():
             sd = self.sd.get(name, np.full(2, np.nan))
             place = columns_of(("x", "y"), mark.position[:2])

@@ -108,7 +108,6 @@ def _scanned_photos(
     kinds: Mapping[str, FilmKind],
     fiducials: Mapping[str, Marks],
 ) -> list[ScannedPhoto]:
-    """Return the photos on film with their images."""
     table, found = photos.table, []
     comparator = Machine(Scanner("comparator", sd=0.0), (), Readings(), None)
     scanners, sides = table.texts("scanner"), table.texts("mirrored")
@@ -341,7 +340,6 @@ class WrittenFilms:
         return any(each.readings.pitch != 1.0 for each in self.films.values())
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """Return the tables of films by name."""
         names = ("column", "row") if self.pixels else ("x", "y")
         if any(each.precision[0, 1] for each in self.readings):
             raise InputError(phrase("plain.correlated-readings"))

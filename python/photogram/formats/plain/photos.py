@@ -48,7 +48,6 @@ class Photos:
 
 
 def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photos:
-    """Read the table of photos; raises the errors of :func:`read`."""
     table = tables.read("photos")
     assert table is not None  # The table of images names photos, too
     everything, use = table.names_once("photo"), table.flags("use")
@@ -255,8 +254,6 @@ _LINES = ("column", "row")
 
 @dataclass(frozen=True)
 class Seam:
-    """The line at which a scan was joined."""
-
     half: str  # Photo name of the second half
     line: str  # `column` or `row`, and the coordinate at which the second half begins
     at: float

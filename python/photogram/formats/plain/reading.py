@@ -55,7 +55,6 @@ def read(path: Path, options: ReadOptions) -> Project:
 
 
 def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSource]:
-    """Read the tables of a project."""
     settings = tables.settings
     if "images" not in settings.tables:
         raise InputError(phrase("error.missing", name="images.csv"), file=settings.path)
@@ -166,7 +165,6 @@ class _Given:
 
 
 def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _Given:
-    """Read a table of control and check points."""
     names = table.names_once("point")
     values = table.vectors(AXES)
     uses = table.words("use", TABLES["control"].words["use"])

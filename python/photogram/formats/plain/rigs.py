@@ -93,7 +93,6 @@ def sensor_of(table: ColumnTable, row: int, rig: Rig, sensor: str, column: str =
 
 
 def times_of(tables: Tables, name: str) -> dict[str, float]:
-    """Return the given times of photos in a table."""
     table = tables.rows(name)
     pairs = zip(table.texts("photo"), table.numbers("time").tolist(), strict=True)
     return {photo: time for photo, time in pairs if not math.isnan(time)}
@@ -168,7 +167,6 @@ class Rigs:
         return None if first is None or first[0] != rig else (rig, first[1], name)
 
     def tables(self, block: Block) -> dict[str, dict[str, Any]]:
-        """Return the tables of rigs, frames and bases."""
         if not self._places:
             return {}
         rows: list[tuple[str, str, Sensor | None]] = []
@@ -347,7 +345,6 @@ def moving_columns(block: Block, rigs: Rigs) -> dict[str, Any]:
 
 
 def line_times_table(block: Block) -> dict[str, Any]:
-    """Return the table of line times."""
     return columns_of_records(
         {"photo": each.photo} | columns_of(("line", "time", "seconds_per_line"), row)
         for each in block.timed

@@ -57,7 +57,6 @@ class Machine:
         return [word for each in joined for word in _WORDS[rows[id(each)] : rows[id(each)] + 3]]
 
     def held(self) -> Machine:
-        """Return the scanner with fixed parameters."""
         curves = tuple(each.replace(sd=0.0) for each in self.curves)
         return Machine(self.scanner.replace(sd=0.0), curves, self.readings, None)
 
@@ -73,7 +72,6 @@ class FilmKind(NamedTuple):
 
 
 def read_scanners(tables: Tables, covariances: Covariances) -> dict[str, Machine]:
-    """Read the table of scanners."""
     table, found = tables.rows("scanners"), {}
     for row, given in enumerate(tables.records("scanners")):
         name, cells = given["scanner"], TABLES["scanners"].defaults | given

@@ -68,7 +68,6 @@ def written_values(block: Block, column: Column, values: Floats) -> dict[str, An
 
 
 def unknown_class(name: str) -> type[Unknown]:
-    """Return a class of unknowns by name."""
     found: type[Unknown] = getattr(unknowns, name, None) or getattr(trajectories, name)
     return found
 
@@ -191,7 +190,6 @@ class Covariances:
         return found
 
     def cameras(self, cameras: Sequence[Camera]) -> list[Camera]:
-        """Return cameras with their covariances."""
         known = {each.name for each in cameras}
         for (kind, name), own in self.parts.items():
             if kind == CAMERA and name not in known:
