@@ -275,19 +275,17 @@ def _covariance(path: Path, camera: str, fields: list[str], sd: Floats) -> Float
         return found
     table = read_columns(path, known=("kind", "name"), numbers=("covariance",))
     table.require("kind", "name", "first", "second", "covariance")
-    texts = {column: table.texts(column) for column in ("kind", "name", "first", "second")}
-    values = table.numbers("covariance")
-    for row, kind in enumerate(texts["kind"]):
-        if kind != "fiducials" or texts["name"][row] != camera:
+    values = table.numbers("covariance").tolist()
+    texts = (table.texts(column) for column in ("kind", "name", "first", "second"))
+    for row, (kind, name, *pair) in enumerate(zip(*texts, strict=True)):
+        if kind != "fiducials" or name != camera:
             continue
-        pair = [texts[column][row] for column in ("first", "second")]
         for word in pair:
             if word not in fields:
                 raise table.error(row, unknown_name("coordinate", word, fields))
-        if np.isnan(values[row]):
-            message = phrase("error.empty")
-            raise table.error(row, phrase("error.column", column="covariance", message=message))
-        i, j = (fields.index(word) for word in pair)
+        if math.isnan(values[row]):
+            raise table.cell_error(row, "covariance", "error.empty")
+        i, j = map(fields.index, pair)
         found[i, j] = found[j, i] = values[row]
     if not is_covariance(found, singular=True):
         raise InputError(phrase("error.covariance-singular"), file=path)

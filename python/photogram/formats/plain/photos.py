@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
-from typing import Any
+from functools import cached_property, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,6 +45,11 @@ class Photos:
     attitude_sd: Floats
     unused: frozenset[str]
     observed: list[Observation | Observations[Any]]
+
+    @cached_property
+    def rows(self) -> dict[str, int]:
+        """Rows by name."""
+        return {name: row for row, name in enumerate(self.names)}
 
 
 def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photos:
@@ -170,8 +175,8 @@ def images_of(tables: Tables, table: ColumnTable, photos: Photos) -> Images:
         tables.remark("plain.camera-column", table.path)
     xs, ys = ("column", "row") if "column" in table else ("x", "y")
     table.require(xs, ys)
-    places = {name: row for row, name in enumerate(photos.names)}
-    rows = indices_of(table, "photo", places | dict.fromkeys(photos.unused, len(places)), "photo")
+    count = len(photos.names)
+    rows = indices_of(table, "photo", photos.rows | dict.fromkeys(photos.unused, count), "photo")
     names = table.names("point")
     xy = table.given((xs, ys))
     again = repeated_pairs(rows, names.rows, len(names.names))
@@ -179,7 +184,7 @@ def images_of(tables: Tables, table: ColumnTable, photos: Photos) -> Images:
         second = int(again[0])
         first = int(np.flatnonzero((rows == rows[second]) & (names.rows == names.rows[second]))[0])
         raise table.error(second, phrase("plain.image-twice", record=table.records[first]))
-    keep = table.flags("use") & (rows < len(places)) if "use" in table or photos.unused else None
+    keep = table.flags("use") & (rows < count) if "use" in table or photos.unused else None
     given = "images" in tables.settings.sd or any(name in table for name in _OF_IMAGES)
     sd = _image_sd(tables, table, given=given)
     whole = Images(given, rows, names.rows, names.names, xy, sd)
@@ -187,7 +192,7 @@ def images_of(tables: Tables, table: ColumnTable, photos: Photos) -> Images:
         return whole
     if left := int(np.count_nonzero(~keep)):
         tables.remark("plain.unused-images", table.path, n=left)
-    return replace(_some(whole, keep), left=_some(whole, ~keep & (rows < len(places))), used=keep)
+    return replace(_some(whole, keep), left=_some(whole, ~keep & (rows < count)), used=keep)
 
 
 def _some(images: Images, which: Bools) -> Images:
@@ -252,8 +257,7 @@ class ImageSource:
 _LINES = ("column", "row")
 
 
-@dataclass(frozen=True)
-class Seam:
+class Seam(NamedTuple):
     half: str  # Photo name of the second half
     line: str  # `column` or `row`, and the coordinate at which the second half begins
     at: float

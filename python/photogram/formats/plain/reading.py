@@ -88,10 +88,9 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     block.position_sd, block.attitude_sd = photos.position_sd, photos.attitude_sd
     owners = {each.name: row for row, each in enumerate(cameras.cameras)}
     owners |= dict(zip(photos.taken, photo_cameras, strict=True))
-    block.rigs(read_frames(tables, rigs, photos.names, photos.taken), owners)
+    block.rigs(read_frames(tables, rigs, photos), owners)
     block.mounts = mounted_halves(seams, block.mounts, timed, photos.names)
-    photo_rows = {name: row for row, name in enumerate(photos.names)}
-    known_objects = Known(places, photo_rows, photos.table.numbers("time").tolist(), trajectories)
+    known_objects = Known(places, photos.rows, photos.table.numbers("time").tolist(), trajectories)
     observations = Observations.of(read_observations(tables, transform, known_objects, rigs))
     boards, bends, regularise = read_boards(tables)
     if trajectories and transform.frame != settings.frame:

@@ -65,16 +65,14 @@ def read_rigs(tables: Tables) -> Mapping[str, Rig]:
     return found
 
 
-def read_frames(
-    tables: Tables, rigs: Mapping[str, Rig], photos: Sequence[str], cameras: Sequence[str]
-) -> list[FrameOf]:
+def read_frames(tables: Tables, rigs: Mapping[str, Rig], photos: Photos) -> list[FrameOf]:
     """Read which photos were taken simultaneously."""
     table = tables.rows("frames")
-    rows = indices_of(table, "photo", {name: row for row, name in enumerate(photos)}, "photo").tolist()
+    rows = indices_of(table, "photo", photos.rows, "photo").tolist()
     found: dict[str, tuple[Rig, dict[str, int]]] = {}
     for row, (photo, cells) in enumerate(zip(rows, tables.records("frames"), strict=True)):
         frame, rig = cells["frame"], rigs[cells["rig"]]
-        sensor = sensor_of(table, row, rig, cells.get("sensor", cameras[photo]))
+        sensor = sensor_of(table, row, rig, cells.get("sensor", photos.taken[photo]))
         first, members = found.setdefault(frame, (rig, {}))
         if first is not rig or sensor in members:
             raise table.error(row, phrase("plain.frame-twice", frame=frame, sensor=sensor))
@@ -121,7 +119,12 @@ class Rigs:
     def __init__(self, block: Block, cameras: Sequence[str], times: Mapping[str, float]) -> None:
         self._times, self._mounts = times, block.mounts
         flown = [each.sensor for each in block.timed if each.sensor is not None]
-        self._clocks = _clocks(block)
+        # Clocks of sensors, if all of their photos share one
+        clocks: dict[str, set[Clock | None]] = {each.sensor.name: {None} for each in block.mounts}
+        for timed in block.timed:
+            if timed.sensor is not None:
+                clocks.setdefault(timed.sensor.name, set()).add(timed.offset)
+        self._clocks = {name: own.pop() for name, own in clocks.items() if len(own) == 1}
         of = dict(zip(block.photo_ids, cameras, strict=True))
         pairs = {(each.sensor.name, of[each.frame], of[each.photo]) for each in block.mounts}
         # On trajectories no photo represents a frame, so the rig is unknown.
@@ -196,16 +199,6 @@ class Rigs:
             ),
             "bases": columns_of_records(dict(zip(_BASE, base, strict=True)) for base in self._bases),
         }
-
-
-def _clocks(block: Block) -> dict[str, Clock]:
-    """Return clocks of sensors, if all of their photos share one."""
-    found: dict[str, Clock | None] = {each.sensor.name: None for each in block.mounts}
-    for each in block.timed:
-        name = "" if each.sensor is None else each.sensor.name
-        if name and found.setdefault(name, each.offset) is not each.offset:
-            found[name] = None
-    return {name: clock for name, clock in found.items() if clock is not None}
 
 
 _MOTION = (*VELOCITY, *RATE)
@@ -303,9 +296,8 @@ def placed(photos: Photos, timed: Sequence[Timed], spheroid: Spheroid | None) ->
     """Return photos with missing poses completed from their trajectories."""
     centres, matrices = photos.centres.copy(), photos.matrices.copy()
     axes = Cartesian(spheroid)
-    places = {name: row for row, name in enumerate(photos.names)}
     for each in timed:
-        row = places[each.photo]
+        row = photos.rows[each.photo]
         if each.trajectory is None or np.isfinite([*centres[row], *matrices[row].ravel()]).all():
             continue
         begin = 0.0 if each.lines is None else float(np.asarray(each.lines.table)[0, 1])
