@@ -12,7 +12,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.formats.images import from_tables, in_unit, to_tables
-from photogram.formats.plain.certificates import certified, read_certificates
+from photogram.formats.plain.film_tables import certified, read_certificates
 from photogram.formats.plain.tables import Tables, columns_of, columns_of_records, made, signs_in_files
 from photogram.formats.plain.unknowns import read_covariances
 from photogram.formats.project import Size

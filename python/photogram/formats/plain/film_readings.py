@@ -11,8 +11,8 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import ContradictionError, InputError, message_of
 from photogram.film.interior import conformal, film_side, is_mirrored, true_places
 from photogram.film.marks import DECIDED, which_mark
+from photogram.formats.plain.film_tables import FilmKind, Machine
 from photogram.formats.plain.photos import Photos
-from photogram.formats.plain.scanners import FilmKind, Machine
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import at_place

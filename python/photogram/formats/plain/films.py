@@ -14,7 +14,6 @@ from photogram.errors import ContradictionError, InputError
 from photogram.film.interior import FilmModel, conformal, interior_orientation
 from photogram.formats.images import scaled_camera
 from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.certificates import Marks, marks_of, read_fiducials
 from photogram.formats.plain.film_readings import (
     ScannedPhoto,
     beyond_message,
@@ -23,16 +22,20 @@ from photogram.formats.plain.film_readings import (
     scale_message,
     side_of,
 )
-from photogram.formats.plain.photos import Images, Photos
-from photogram.formats.plain.scanners import (
+from photogram.formats.plain.film_tables import (
     FilmKind,
     Machine,
+    Marks,
     film_cells,
     machines_of,
+    marks_of,
+    read_fiducials,
     read_films,
     read_scanners,
+    roll_of,
     scanner_cells,
 )
+from photogram.formats.plain.photos import Images, Photos
 from photogram.formats.plain.schema import deviation_columns
 from photogram.formats.plain.tables import Tables, columns_of, columns_of_records, made, signs_in_files
 from photogram.formats.plain.unknowns import Covariances
@@ -329,10 +332,6 @@ class WrittenFilms:
         self.machines = machines_of(self.films.values(), together)
         self.certificates = marks_of(self.readings, together, camera_of)
         self.by_mark = {mark: name for own in self.certificates.values() for name, mark in own.marks.items()}
-        self._rolls = {
-            photo: self.known[photo].roll if film.roll is None and photo in self.known else film.roll
-            for photo, film in self.films.items()
-        }
 
     @property
     def pixels(self) -> bool:
@@ -351,7 +350,7 @@ class WrittenFilms:
         )
         films: dict[str, dict[str, Any]] = {}  # One row for all photos of a roll
         for photo, film in self.films.items():
-            cells = {"film": "film"} | film_cells(film, self._rolls[photo], self._sizes(photo))
+            cells = film_cells(film, self.known.get(photo))
             row = films.setdefault(cells["film"], cells)
             if any(None not in (row.get(key), cell) and row.get(key) != cell for key, cell in cells.items()):
                 raise InputError(phrase("plain.film-differs", film=cells["film"], photo=photo))
@@ -369,7 +368,8 @@ class WrittenFilms:
         """Return the columns of photos; empty without films."""
         rows: dict[str, dict[str, Any]] = {photo: {} for photo in self.photos}
         for photo, film in self.films.items():
-            known, roll, start = self.known.get(photo), self._rolls[photo], film.placement.position
+            known, start = self.known.get(photo), film.placement.position
+            roll = roll_of(film, known)
             if known is not None and known.covariance is not None:
                 start = np.asarray(known.values, dtype=float)[:3]
             rows[photo] = {"film": "film" if roll is None else roll.name, "scanner": film.scanner.name}
@@ -390,17 +390,3 @@ class WrittenFilms:
             if marks.covariance is not None:
                 found.append(("fiducials", camera, marks.words, marks.covariance))
         return found
-
-    def _sizes(self, photo: str) -> Mapping[str, float | None]:
-        """Return standard deviations of m, b1, b2; None with covariances."""
-        known, sd = self.known.get(photo), self.films[photo].size.deviations
-        if known is not None and known.covariance is not None:
-            if tuple(known.known) != FILM:
-                raise InputError(phrase("plain.film-covariance", name=known.name, names=list(FILM)))
-            return {name: None if own else 0.0 for name, own in zip(FILM[3:], sd, strict=True)}
-        found = dict(zip(FILM[3:], np.where(sd == 0, 0.0, np.inf).tolist(), strict=True))
-        if known is None:
-            return found
-        if not set(known.known) <= set(found) or np.any(known.values):
-            raise InputError(phrase("plain.film-priors", name=known.name))
-        return found | dict(zip(known.known, np.sqrt(np.diag(known.precision)).tolist(), strict=True))
