@@ -13,6 +13,7 @@ from photogram.film.interior import conformal, film_side, is_mirrored, true_plac
 from photogram.film.marks import DECIDED, which_mark
 from photogram.formats.plain.film_tables import FilmKind, Machine
 from photogram.formats.plain.photos import Photos
+from photogram.formats.plain.schema import deviation_columns
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import at_place
@@ -145,8 +146,7 @@ def read_marks(tables: Tables, photos: Photos, scanned: Sequence[ScannedPhoto]) 
     """Add the readings of marks to scanned photos, with names by position if the table has none."""
     table = tables.rows("fiducial_images")
     names = ("column", "row") if "column" in table else ("x", "y")
-    xy = table.given(names)
-    own = ["sd_column", "sd_row"] if "column" in table else ["sd_x", "sd_y"]
+    xy, own = table.given(names), deviation_columns(names)
     sd = tables.deviations(table, "fiducial_images", own)
     table.check_given(sd, own, "fiducial_images")
     known = [*photos.names, *photos.unused]
