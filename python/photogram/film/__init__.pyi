@@ -1,9 +1,9 @@
 from .certificate import CalibratedMarks as CalibratedMarks
 from .certificate import Certificate as Certificate
-from .certificate_check import DistanceDifference as DistanceDifference
-from .certificate_check import Explanation as Explanation
 from .distances import AdjustedMarks as AdjustedMarks
 from .distances import Crossing as Crossing
+from .distances import DistanceDifference as DistanceDifference
+from .distances import Explanation as Explanation
 from .distances import MarkDistance as MarkDistance
 from .distances import RightAngle as RightAngle
 from .distances import adjust_distances as adjust_distances

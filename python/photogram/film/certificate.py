@@ -14,9 +14,16 @@ import numpy as np
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.film.certificate_check import DistanceDifference, difference_of
 from photogram.film.certificate_file import REFERENCES, SD_PLACE, read_table, read_toml
-from photogram.film.distances import AdjustedMarks, Crossing, MarkDistance, RightAngle, adjust_distances
+from photogram.film.distances import (
+    AdjustedMarks,
+    Crossing,
+    DistanceDifference,
+    MarkDistance,
+    RightAngle,
+    adjust_distances,
+    difference_of,
+)
 from photogram.film.lens_table import (
     Curve,
     LensParameters,
@@ -182,12 +189,9 @@ class Certificate(Documented, Judged):
     def check(self) -> tuple[DistanceDifference, ...]:
         """Compare distances with coordinates and explain differences beyond 0.010 mm."""
         figures = {
-            f"{mark}.{axis}": repr(v)
-            for mark, xy in self.places.items()
-            for axis, v in zip("xy", xy, strict=True)
+            f"{mark}.{axis}": repr(xy["xy".index(axis)]) for mark, xy in self.places.items() for axis in "xy"
         }
-        figures |= {each.name: repr(each.length) for each in self.distances}
-        figures |= self.typed
+        figures |= {each.name: repr(each.length) for each in self.distances} | dict(self.typed)
         return tuple(
             difference_of(each.first, each.second, figures, self._design)
             for each in self.distances
@@ -215,25 +219,22 @@ class Certificate(Documented, Judged):
     def _marks(self) -> CalibratedMarks:
         if self.places:
             names, xy = tuple(self.places), np.array([*self.places.values()])
-            sd = SD_PLACE if self.sd_places is None else self.sd_places
+            variance = (SD_PLACE if self.sd_places is None else self.sd_places) ** 2
             given = self.covariance
-            return CalibratedMarks(names, xy, sd**2 * np.eye(xy.size) if given is None else given)
-        marks = self._of_distances()
+            return CalibratedMarks(names, xy, variance * np.eye(xy.size) if given is None else given)
+        marks, places = self._of_distances(), self._design
         if not marks:
             raise self._error("films.no-marks")
-        places = self._design
         if missing := [name for name in marks if name not in places]:
             raise self._error("films.no-design", marks=missing)
-        usual = {
-            mark: sd for mark, (_, sd) in usual_places(self.camera_type).items() if mark not in self.design
-        }
+        usual = {mark: sd for mark, (_, sd) in usual_places(self.camera_type).items()}
+        sd = dict.fromkeys(places, SD_DESIGN) | usual | dict.fromkeys(self.design, SD_DESIGN)
+        sd |= {} if self.sd_design is None else dict.fromkeys(places, self.sd_design)
         adjusted = adjust_distances(
             marks,
             np.array([places[name] for name in marks]),
             self.distances,
-            design_sd=np.array(
-                [usual.get(name, SD_DESIGN) if self.sd_design is None else self.sd_design for name in marks]
-            ),
+            design_sd=np.array([sd[name] for name in marks]),
             conditions=self.lines,
         )
         return CalibratedMarks(adjusted.names, adjusted.xy, adjusted.covariance, adjusted)
@@ -250,13 +251,17 @@ class Certificate(Documented, Judged):
         InputError
             If the table is missing or too short.
         """
-        if self.radial is None or self.c is None:
-            raise self._error("films.no-distortion")
-        return curves_of(self.radial, self.c, self._sd_c)
+        return curves_of(*self._distortion)
 
     @property
     def _sd_c(self) -> float:
         return SD_C if self.sd_c is None else self.sd_c
+
+    @property
+    def _distortion(self) -> tuple[RadialTable, float, float]:
+        if self.radial is None or self.c is None:
+            raise self._error("films.no-distortion")
+        return self.radial, self.c, self._sd_c
 
     def curve(self, terms: int | None = None) -> Curve:
         """Return the distortion curve with `terms` odd terms; None: chosen by tests.
@@ -268,9 +273,7 @@ class Certificate(Documented, Judged):
         """
         if terms is None:
             return chosen(self.curves())
-        if self.radial is None or self.c is None:
-            raise self._error("films.no-distortion")
-        return fit_curve(self.radial, self.c, self._sd_c, terms)
+        return fit_curve(*self._distortion, terms)
 
     @property
     def principal_point(self) -> tuple[tuple[float, float], float, str]:
@@ -341,13 +344,11 @@ class Certificate(Documented, Judged):
 
     def printed_coefficients(self) -> float | None:
         """Return the largest deviation of printed K0, K1 ... from the table, mm, or None."""
+        return self._printed(1.0)
+
+    def _printed(self, sign: float) -> float | None:
         if not self.radial_coefficients or self.radial is None or self.c is None:
             return None
-        return self._printed_less(1.0)
-
-    def _printed_less(self, sign: float) -> float:
-        assert self.radial is not None
-        assert self.c is not None
         radius = self.c * np.tan(self.radial.angle)
         powers = radius[:, np.newaxis] ** (2 * np.arange(len(self.radial_coefficients)) + 1)
         return float(np.abs(powers @ self.radial_coefficients - sign * self.radial.distortion).max())
@@ -368,8 +369,9 @@ class Certificate(Documented, Judged):
         remarks: list[str | Phrase] = [*self.remarks]
         difference = self.printed_coefficients()
         if difference is not None and difference > PRINTED:
-            opposite = self._printed_less(-1.0) <= PRINTED
-            code = "films.printed-other-sign" if opposite else "films.printed"
+            opposite = self._printed(-1.0)
+            is_opposite = opposite is not None and opposite <= PRINTED
+            code = "films.printed-other-sign" if is_opposite else "films.printed"
             remarks.append(phrase(code, difference=1e3 * difference))
         if self.radial_coefficients and self.radial is None:
             remarks.append(phrase("films.printed-alone"))

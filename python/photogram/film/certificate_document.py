@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.film.certificate_check import DistanceDifference, Explanation, difference_message
-from photogram.film.distances import AdjustedMarks
-from photogram.film.lens_table import Curve, RadialTable
+from photogram.film.distances import LIMIT, AdjustedMarks, DistanceDifference, Explanation, difference_message
+from photogram.film.lens_table import Curve
 from photogram.lazy_dataclasses import replace
 from photogram.network.cameras import Camera
 from photogram.show.judgement import verdict_document, verdict_table
@@ -26,11 +25,18 @@ from photogram.statistics.limits import GlobalTest, global_test
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
-    from photogram.film import CalibratedMarks, Certificate
+    from photogram.film import Certificate
 
 CURVE = (
     "Readings with their standard deviation, the fitted curve with its own; beyond the table it is dashed."
 )
+
+
+MM = (Axis("", "mm", small="um", factor=1e3),)
+XY = tuple(Axis(name, "mm", small="um", factor=1e3) for name in "xy")
+OBSERVED = (Axis("length", "mm", small="um", factor=1e3), Axis.turned("angle", "deg"))
+ANGLE = (Axis.turned("", "deg"),)
+RADII = 8  # points of the printed distortion curve
 
 
 def certificate_document(certificate: Certificate) -> Document:
@@ -42,13 +48,20 @@ def certificate_document(certificate: Certificate) -> Document:
     differences = certificate.check()
     distances = compared(differences)
     mark_parts, of_marks = _marks(certificate)
-    of_cameras = []
+    of_cameras, parameters = [], list[Part]()
     for camera in cameras:
         assert camera.covariance is not None
         names, matrix = camera.covariance
         covariance = {"order": [*names], "matrix": np.asarray(matrix)}
-        parts = {"parameters": dict(camera.parameters), "covariance": covariance}
-        of_cameras.append({**members(camera, "model", "unit"), **parts})
+        own = {"parameters": dict(camera.parameters), "covariance": covariance}
+        of_cameras.append({**members(camera, "model", "unit"), **own})
+        columns = [
+            Quantity([*names], kind="name", head="Parameter"),
+            Quantity(np.array([camera.parameters[name] for name in names]), head="Value", figures=8),
+            Quantity(np.sqrt(np.diag(np.asarray(matrix))), head="sd", figures=3),
+            Quantity([camera.unit_of(name) or "1" for name in names], kind="name", head="Unit"),
+        ]
+        parameters.append(Table(f"parameters_{camera.model}", f"Camera {camera.model}", columns))
     lens_parts, of_lens = _lens(certificate)
     return verdict_document(
         verdict,
@@ -59,7 +72,7 @@ def certificate_document(certificate: Certificate) -> Document:
             Section("distances", distances.title, [distances, explanations(differences)], distances.about),
             Section("marks", "Marks", mark_parts),
             Section("lens", "Lens", lens_parts),
-            Section("camera", "Camera", [*map(parameters, cameras)]),
+            Section("camera", "Camera", parameters),
             Section.of(verdict_table(verdict)),
             Section("certificate", "Certificate", [Facts("Certificate", facts)]),
         ],
@@ -80,30 +93,51 @@ def _marks(certificate: Certificate) -> tuple[list[Part], dict[str, Any] | None]
     if not (certificate.places or certificate.distances):
         return [], None
     found = certificate.fiducials()
-    parts: list[Part] = [marks(found)]
+    sd = np.sqrt(np.diag(found.covariance)).reshape(-1, 2)
+    columns = [
+        Quantity([*found.names], kind="name", member="mark", head="Mark"),
+        Quantity(found.xy, XY, "value", member="xy_mm", head="{}", decimals=4),
+        Quantity(sd, XY, "deviation", member="sd_mm", head="sd {}", decimals=1),
+    ]
+    parts: list[Part] = [Table("marks.places", "Places of the marks", columns)]
     order = [f"{name}.{axis}" for name in found.names for axis in "xy"]
-    adjustment = None
-    if found.adjusted is not None:
-        test = found.adjusted.test
-        tests = _distances(found.adjusted)
-        parts.append(observed(found.adjusted, certificate.verdict.marks(tests.kind, tests.values.shape)))
-        adjustment = {
-            **members(found.adjusted, "degrees_of_freedom", free_movements="free"),
+    own = {"covariance_mm2": {"order": order, "matrix": found.covariance}, "adjustment": None}
+    if (adjusted := found.adjusted) is not None:
+        test, tests = adjusted.test, _distances(adjusted)
+        parts.append(observed(adjusted, certificate.verdict.marks(tests.kind, tests.values.shape)))
+        own["adjustment"] = {
+            **members(adjusted, "degrees_of_freedom", free_movements="free"),
             "omega": test.weighted_sum_of_squares if test else None,
             "probability": test.probability_above if test else None,
         }
-    return parts, {
-        "covariance_mm2": {"order": order, "matrix": found.covariance},
-        "adjustment": adjustment,
-    }
+    return parts, own
 
 
 def _lens(certificate: Certificate) -> tuple[list[Part], dict[str, Any] | None]:
-    if certificate.radial is None:
+    if (table := certificate.radial) is None:
         return [], None
     own = certificate.curve()
     drawing = Drawing("picture-distortion", "Radial distortion", CURVE, partial(_sketch, certificate))
-    tables = [distortion(certificate.radial, own), terms(certificate.curves(), own.terms), curve(own)]
+    distortion = [
+        Quantity(table.angle, ANGLE, "value", member="angle_rad", head="Angle", decimals=2),
+        _mm(own.radius, "value", "radius", "Radius", 3),
+        _mm(table.distortion, "deviation", "distortion", "Distortion", 1),
+        _mm(own.residuals, "deviation", "residual", "Residual", 2),
+        Quantity(own.redundancy, member="redundancy", head="Redundancy", decimals=3),
+        Quantity(own.standardized, member="w", head="w", decimals=2),
+    ]
+    radius = np.linspace(0.0, float(own.radius.max()), RADII + 1)[1:]
+    radius = np.append(radius, radius[-1] + radius[0])
+    curve = [
+        _mm(radius, "value", "radius", "Radius", 1),
+        _mm(own.at(radius), "deviation", "distortion", "Distortion", 2),
+        _mm(own.sd_at(radius), "deviation", "sd", "sd", 2),
+    ]
+    tables = [
+        Table("lens.table", "Table of radial distortion", distortion),
+        terms(certificate.curves(), own.terms),
+        Table("lens.curve", "Curve, the last radius beyond the table", curve),
+    ]
     return [drawing, *tables], {
         **members(own, "terms", focal_length_mm="focal_length", sd_focal_length_mm="sd_focal_length"),
         "brown_apart_mm": certificate.lens("brown").apart,
@@ -149,32 +183,27 @@ def certificate_findings(certificate: Certificate) -> Findings:
     """Return the tests of a certificate: distances and coordinates, distances, lens."""
     compared = certificate.check()
     beyond = [difference_message(each) for each in compared if each.beyond]
-    tests: list[Tested] = []
-    fits: list[GlobalTest] = []
-    if compared:
-        tests.append(_compared(certificate))
+    tests = [_compared(certificate)] if compared else list[Tested]()
+    fits, agreement = list[GlobalTest | None](), list[Phrase]()
+    if compared and not beyond:
+        largest = max(abs(each.difference) for each in compared)
+        agreement = [Phrase("line.distances", {"n": len(compared), "largest": 1e3 * float(largest)})]
     if not certificate.places and (certificate.distances or certificate.lines):
         adjusted = certificate.fiducials().adjusted
         assert adjusted is not None
         tests.append(_distances(adjusted))
-        fits += [adjusted.test] if adjusted.test else []
+        fits.append(adjusted.test)
+        if certificate.distances:
+            agreement = [Phrase("line.free-figure" if adjusted.free else "line.few-distances")]
     if certificate.radial is not None:
-        curve, angles = certificate.curve(), np.degrees(certificate.radial.angle)
+        curve, angles = certificate.curve(), np.degrees(certificate.radial.angle).tolist()
         kind = phrase("films.readings")
         tests.append(
-            Tested(kind, curve.standardized, lambda at: phrase("films.reading", angle=float(angles[at[0]])))
+            Tested(kind, curve.standardized, lambda at: phrase("films.reading", angle=angles[at[0]]))
         )
-        fits += [curve.test] if curve.test else []
-    agreement = []
-    if compared and not beyond:
-        largest = max(abs(each.difference) for each in compared)
-        agreement.append(Phrase("line.distances", {"n": len(compared), "largest": 1e3 * float(largest)}))
-    elif not certificate.places and certificate.distances:
-        adjusted = certificate.fiducials().adjusted
-        assert adjusted is not None
-        agreement.append(Phrase("line.free-figure" if adjusted.free else "line.few-distances"))
-    freedom = sum(test.degrees_of_freedom for test in fits)
-    squares = sum(test.weighted_sum_of_squares for test in fits)
+        fits.append(curve.test)
+    freedom = sum(test.degrees_of_freedom for test in fits if test)
+    squares = sum(test.weighted_sum_of_squares for test in fits if test)
     return Findings(
         status="converged",
         observations=tests,
@@ -209,31 +238,14 @@ def _compared(certificate: Certificate) -> Tested:
     return Tested(phrase("films.compared"), np.array(w), lambda at: compared[at[0]].name)
 
 
-MM = (Axis("", "mm", small="um", factor=1e3),)
-XY = tuple(Axis(name, "mm", small="um", factor=1e3) for name in "xy")
-OBSERVED = (Axis("length", "mm", small="um", factor=1e3), Axis.turned("angle", "deg"))
-RADII = 8  # points of the printed distortion curve
-
-
-def marks(found: CalibratedMarks) -> Table:
-    sd = np.sqrt(np.diag(found.covariance)).reshape(-1, 2)
-    columns = [
-        Quantity([*found.names], kind="name", member="mark", head="Mark"),
-        Quantity(found.xy, XY, "value", member="xy_mm", head="{}", decimals=4),
-        Quantity(sd, XY, "deviation", member="sd_mm", head="sd {}", decimals=1),
-    ]
-    return Table("marks.places", "Places of the marks", columns)
-
-
 def compared(differences: Sequence[DistanceDifference]) -> Table:
     lengths = partial(of_each, differences, axes=MM, kind="value")
-    beyond = np.array([each.beyond for each in differences], bool)
     apart = np.array([each.difference for each in differences])
     columns = [
         of_each(differences, "name", kind="name", member="distance", head="Distance"),
         lengths("distance", member="distance_mm", head="Given", decimals=3),
         lengths("from_coordinates", member="from_coordinates_mm", head="From coordinates", decimals=4),
-        replace(_mm(apart, "deviation", "difference", "Difference", 1), marked=beyond),
+        replace(_mm(apart, "deviation", "difference", "Difference", 1), marked=np.abs(apart) > LIMIT),
         of_each(differences, "beyond"),
         Quantity([[vars(one) for one in each.explanations] for each in differences], member="explanations"),
     ]
@@ -281,30 +293,6 @@ def observed(found: AdjustedMarks, marked: Bools) -> Table:
     return Table("marks.adjustment.observed", "Adjustment of distances", columns)
 
 
-def distortion(table: RadialTable, found: Curve) -> Table:
-    angle = (Axis.turned("", "deg"),)
-    columns = [
-        Quantity(table.angle, angle, "value", member="angle_rad", head="Angle", decimals=2),
-        _mm(found.radius, "value", "radius", "Radius", 3),
-        _mm(table.distortion, "deviation", "distortion", "Distortion", 1),
-        _mm(found.residuals, "deviation", "residual", "Residual", 2),
-        Quantity(found.redundancy, member="redundancy", head="Redundancy", decimals=3),
-        Quantity(found.standardized, member="w", head="w", decimals=2),
-    ]
-    return Table("lens.table", "Table of radial distortion", columns)
-
-
-def curve(found: Curve) -> Table:
-    radius = np.linspace(0.0, float(found.radius.max()), RADII + 1)[1:]
-    radius = np.append(radius, radius[-1] + radius[0])
-    columns = [
-        _mm(radius, "value", "radius", "Radius", 1),
-        _mm(found.at(radius), "deviation", "distortion", "Distortion", 2),
-        _mm(found.sd_at(radius), "deviation", "sd", "sd", 2),
-    ]
-    return Table("lens.curve", "Curve, the last radius beyond the table", columns)
-
-
 def terms(curves: tuple[Curve, ...], taken: int) -> Table:
     """Return the fits with one to three odd terms; `taken` is the chosen number."""
     omega = [each.omega for each in curves]
@@ -323,16 +311,3 @@ def terms(curves: tuple[Curve, ...], taken: int) -> Table:
         Quantity([each.covariance for each in curves], member="covariance"),
     ]
     return Table("lens.fits", "Odd terms beside k0", columns)
-
-
-def parameters(camera: Camera) -> Table:
-    assert camera.covariance is not None
-    names, matrix = camera.covariance
-    sd = np.sqrt(np.diag(np.asarray(matrix)))
-    columns = [
-        Quantity([*names], kind="name", head="Parameter"),
-        Quantity(np.array([camera.parameters[name] for name in names]), head="Value", figures=8),
-        Quantity(sd, head="sd", figures=3),
-        Quantity([camera.unit_of(name) or "1" for name in names], kind="name", head="Unit"),
-    ]
-    return Table(f"parameters_{camera.model}", f"Camera {camera.model}", columns)

@@ -53,22 +53,19 @@ def read_toml(path: Path) -> dict[str, Any]:
         "camera_type": table.get("type", "").text(),
         "day": table["date"].day() if "date" in table else None,
         "c": abs(table["c"].number(-LARGEST, LARGEST)) if "c" in table else None,
-        "sd_c": _positive(table, "sd_c"),
         "reference": table.get("principal_point", "fiducial-centre").choice(REFERENCES),
         "autocollimation": frame.place(table, "autocollimation"),
         "symmetry": frame.place(table, "symmetry"),
-        "sd_principal_point": _positive(table, "sd_principal_point"),
         "places": frame.places(table.table("fiducials")),
-        "sd_places": _positive(table, "sd_fiducials"),
         "distances": frame.distances(
             table.table("distances"), table.get("sd_distances", SD_DISTANCE).positive()
         ),
         "design": frame.places(table.table("design")),
-        "sd_design": _positive(table, "sd_design"),
         "lines": frame.lines(table),
         "typed": frame.typed,
         "file": path,
     }
+    found |= {field: table[key].positive() for field, key in _DEVIATIONS.items() if key in table}
     if found["c"] == 0:
         raise table["c"].error(phrase("error.positive", value=0.0))
     found |= _radial(table, found["c"], frame)
@@ -76,6 +73,8 @@ def read_toml(path: Path) -> dict[str, Any]:
     return found
 
 
+_DEVIATIONS = {name: name for name in ("sd_c", "sd_principal_point", "sd_design")}
+_DEVIATIONS["sd_places"] = "sd_fiducials"  # Keys by field
 REFERENCES = ("fiducial-centre", "autocollimation", "symmetry")  # Possible origins of coordinates
 
 
@@ -147,10 +146,6 @@ class _Frame:
 
 def _text(value: Any) -> str:
     return str(value).replace("_", "")
-
-
-def _positive(table: TomlTree, key: str) -> float | None:
-    return table[key].positive() if key in table else None
 
 
 def _numbers(table: TomlTree, key: str, *counts: int) -> Floats:
@@ -280,19 +275,17 @@ def _covariance(path: Path, camera: str, fields: list[str], sd: Floats) -> Float
         return found
     table = read_columns(path, known=("kind", "name"), numbers=("covariance",))
     table.require("kind", "name", "first", "second", "covariance")
-    texts = {column: table.texts(column) for column in ("kind", "name", "first", "second")}
-    values = table.numbers("covariance")
-    for row, kind in enumerate(texts["kind"]):
-        if kind != "fiducials" or texts["name"][row] != camera:
+    values = table.numbers("covariance").tolist()
+    texts = (table.texts(column) for column in ("kind", "name", "first", "second"))
+    for row, (kind, name, *pair) in enumerate(zip(*texts, strict=True)):
+        if kind != "fiducials" or name != camera:
             continue
-        pair = [texts[column][row] for column in ("first", "second")]
         for word in pair:
             if word not in fields:
                 raise table.error(row, unknown_name("coordinate", word, fields))
-        if np.isnan(values[row]):
-            message = phrase("error.empty")
-            raise table.error(row, phrase("error.column", column="covariance", message=message))
-        i, j = (fields.index(word) for word in pair)
+        if math.isnan(values[row]):
+            raise table.cell_error(row, "covariance", "error.empty")
+        i, j = map(fields.index, pair)
         found[i, j] = found[j, i] = values[row]
     if not is_covariance(found, singular=True):
         raise InputError(phrase("error.covariance-singular"), file=path)

@@ -26,7 +26,7 @@ from photogram.network.films import (
     ScannerCurve,
 )
 from photogram.statistics.fits import Fit
-from photogram.words import Phrase, phrase
+from photogram.words import phrase
 
 FilmModel = Literal["conformal", "affine", "bilinear", "projective"]
 
@@ -188,7 +188,8 @@ def interior_orientation(
         raise InputError(phrase("films.few-marks", model=model, **fields))
     own, machine = counted or Readings(), scanner or Scanner("scanner", sd=0.0)
     true = true_places(xy, own, machine, curves)
-    side = _side(q, true, mirrored)
+    if (side := film_side(q, true, mirrored)) is None:
+        raise InputError(phrase("films.unknown-side"))
     nodes = 0 if reseau is None else len(reseau.weights)
     known, rows, size = len(names), xy.size, np.abs(q).max()
     values = np.zeros(8 + 2 * nodes)
@@ -244,14 +245,23 @@ def interior_orientation(
     )
 
 
-def _side(places: Floats, true: Floats, mirrored: bool | None) -> bool:
-    """Return whether the film was scanned mirrored, by its marks or as given."""
+def film_side(places: Floats, true: Floats, mirrored: bool | None) -> bool | None:
+    """Return whether a film was scanned mirrored, by its marks or as given; None if unknown.
+
+    ContradictionError: if the marks contradict the given side.
+    """
     found = is_mirrored(places, true)
-    if mirrored is None and found is None:
-        raise InputError(phrase("films.unknown-side"))
-    if mirrored is not None and found is not None and found != mirrored:
-        raise ContradictionError(mirror_message(mirrored, side_residuals(places, true)))
-    return bool(found if mirrored is None else mirrored)
+    if mirrored is None or found is None or found == mirrored:
+        return found if mirrored is None else mirrored
+    apart = []
+    for side in (False, True):
+        t1, t2, theta, m = conformal(places, true, mirrored=side)
+        q = places @ np.array([-1.0 if side else 1.0, 1j])
+        left = true @ np.array([1.0, 1j]) - (t1 + 1j * t2 + (1.0 + m) * np.exp(1j * theta) * q)
+        apart.append(float(np.sqrt(np.mean(np.abs(left) ** 2))))
+    code = "films.not-mirrored" if mirrored else "films.mirrored"
+    code = "films.wrong-marks" if apart[found] > FAR else code
+    raise ContradictionError(phrase(code, given=apart[mirrored], other=apart[found]))
 
 
 def _equations(
@@ -281,29 +291,6 @@ def true_places(
 
 def _vectors(film: Film) -> Floats:
     return np.array([each.position for each in film.unknowns])
-
-
-def mirror_message(given: bool, apart: tuple[float, float]) -> Phrase:
-    """Return the message if marks contradict the given side of the film.
-
-    `apart` contains the root mean squares (mm) of their residuals, as scanned and mirrored.
-    """
-    fields = {"given": apart[given], "other": apart[not given]}
-    code = "films.wrong-marks" if fields["other"] > FAR else "films.mirrored"
-    if code == "films.mirrored" and given:
-        code = "films.not-mirrored"
-    return phrase(code, **fields)
-
-
-def side_residuals(places: Floats, true: Floats) -> tuple[float, float]:
-    """Return the RMS (mm) of conformal fits to the marks, as scanned and mirrored."""
-    found = []
-    for mirrored in (False, True):
-        t1, t2, theta, m = conformal(places, true, mirrored=mirrored)
-        q = places @ np.array([-1.0 if mirrored else 1.0, 1j])
-        left = true @ np.array([1.0, 1j]) - (t1 + 1j * t2 + (1.0 + m) * np.exp(1j * theta) * q)
-        found.append(float(np.sqrt(np.mean(np.abs(left) ** 2))))
-    return found[0], found[1]
 
 
 def _parts(reseau: Reseau, places: Floats) -> Floats:

@@ -23,6 +23,7 @@ DataStrip = Literal["left", "top"]
 
 SIDES = ("ll", "ur", "ul", "lr", "ml", "mr", "mt", "mb")
 """The marks in the order of their numbers in USGS certificates, 1 to 8."""
+_NUMBERS = {str(number): side for number, side in enumerate(SIDES, 1)}
 _LETTERS = {"a": "ml", "b": "mr", "c": "mb", "d": "mt"}
 _TURNED = {"ul": "ll", "ll": "lr", "lr": "ur", "ur": "ul", "mt": "ml", "ml": "mb", "mb": "mr", "mr": "mt"}
 """Sides of a frame with the strip at the top, by their names with it at the left."""
@@ -31,10 +32,8 @@ _TURNED = {"ul": "ll", "ll": "lr", "lr": "ur", "ur": "ul", "mt": "ml", "ml": "mb
 def by_side(name: str) -> str:
     """Return the side for the number or letter of a mark; other names are unchanged."""
     plain = name.strip()
-    if plain in {str(number) for number in range(1, len(SIDES) + 1)}:
-        return SIDES[int(plain) - 1]
     low = plain.lower()
-    return low if low in SIDES else _LETTERS.get(low, plain)
+    return low if low in SIDES else (_NUMBERS | _LETTERS).get(low, plain)
 
 
 def turned_name(name: str, data_strip: DataStrip) -> str:
@@ -46,16 +45,7 @@ def turned(xy: Floats, data_strip: DataStrip) -> Floats:
     return np.stack([-xy[..., 1], xy[..., 0]], axis=-1) if data_strip == "top" else xy
 
 
-_SIGNS = {
-    "ll": (-1, -1),
-    "ur": (1, 1),
-    "ul": (-1, 1),
-    "lr": (1, -1),
-    "ml": (-1, 0),
-    "mr": (1, 0),
-    "mt": (0, 1),
-    "mb": (0, -1),
-}
+_SIGNS = dict(zip(SIDES, [(-1, -1), (1, 1), (-1, 1), (1, -1), (-1, 0), (1, 0), (0, 1), (0, -1)], strict=True))
 """Directions of marks from the centre."""
 
 

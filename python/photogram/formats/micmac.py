@@ -176,7 +176,7 @@ def write_marks(project: Project) -> dict[str, bytes]:
     places = {name: mark.position[:2] * [1.0, -1.0] for name, mark in certificate.marks.items()}
     photos: dict[str, dict[str, Floats]] = {}
     for each in films.readings:
-        photos.setdefault(each.photo, {})[films.by_mark[id(each.mark)]] = each.observed[:2]
+        photos.setdefault(each.photo, {})[films.by_mark[each.mark]] = each.observed[:2]
     names = "".join(f"{name}\n" for name in places).encode()
     files = {NAMES: names, f"{SCANS}/{CAMERA}": _document("Glob", places, whole=False)}
     for photo, own in photos.items():

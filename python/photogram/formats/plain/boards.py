@@ -46,7 +46,6 @@ def read_boards(tables: Tables) -> tuple[dict[str, Board], list[Figure], str | N
 
 
 def boards_table(boards: Mapping[str, Board], block: Block, regularise: str | None) -> dict[str, Any]:
-    """Return columns of boards, deflections and camera priors."""
     bends = {own.bend.name: own.bend for own in block.passages if isinstance(own, Figure)}
     rows = []
     for name, own in boards.items():

@@ -12,7 +12,7 @@ from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError
 from photogram.formats.images import from_tables, in_unit, to_tables
-from photogram.formats.plain.certificates import certified, read_certificates
+from photogram.formats.plain.film_tables import certified, read_certificates
 from photogram.formats.plain.tables import Tables, columns_of, columns_of_records, made, signs_in_files
 from photogram.formats.plain.unknowns import read_covariances
 from photogram.formats.project import Size
@@ -61,11 +61,10 @@ def picture_edges(camera: Camera, direction: str, extent: Floats) -> Floats:
 
 def of_cameras(block: Block, cameras: Sequence[Camera], which: Sequence[int]) -> list[Exposure]:
     """Return the shutter or line sensor of each camera of a block; None without."""
-    of_photos = {each.photo: each for each in block.timed}
+    of_photos = {each.photo: each.line_sensor or each.shutter for each in block.timed}
     found: dict[int, Exposure] = {}
     for photo, row in zip(block.photo_ids, which, strict=True):
-        timed = of_photos.get(photo)
-        own = None if timed is None else timed.shutter if timed.line_sensor is None else timed.line_sensor
+        own = of_photos.get(photo)
         if found.setdefault(row, own) != own:
             raise InputError(phrase("plain.several-exposures", camera=cameras[row].title))
     return [found.get(row) for row in range(len(cameras))]
@@ -103,8 +102,6 @@ SMALLEST_DISTANCE = 0.1  # Smallest principal distance, relative to the image wi
 
 
 class TableCamera(NamedTuple):
-    """A camera with the further cells of its row."""
-
     camera: Camera
     size: Size | None
     pixel_mm: float | None
@@ -122,12 +119,10 @@ class Cameras(NamedTuple):
 
     @property
     def cameras(self) -> list[Camera]:
-        """The cameras."""
         return [each.camera for each in self.rows]
 
 
 def read_cameras(tables: Tables) -> Cameras:
-    """Read the table of cameras."""
     table = tables.read("cameras")
     if table is None:
         raise InputError(phrase("error.missing", name="cameras.csv"), file=tables.settings.path)
@@ -136,8 +131,7 @@ def read_cameras(tables: Tables) -> Cameras:
     certificates, covariances = read_certificates(tables), read_covariances(tables)
     rows, in_mm = list[TableCamera](), list[str]()
     for row, cells in enumerate(tables.records("cameras")):
-        is_correlated = bool(covariances.names("camera", cells["camera"]))
-        own = _Row(tables, table, row, cells, is_correlated)
+        own = _Row(tables, table, row, cells, bool(covariances.names("camera", cells["camera"])))
         parts, converted = own.divisor()
         in_mm += [own.name] * converted
         with at_place(table.at(row)):
@@ -180,7 +174,6 @@ class _Row:
             self.values = {name: value for name, value in self.values.items() if name not in OF_LINES}
 
     def _line_sensor(self) -> LineSensor | None:
-        """Return the line sensor; None for frame cameras."""
         table, row, cells = self.table, self.row, self.cells
         pitches = [cells.get(name, 0.0) for name in _PITCH]
         if not cells.keys() & set(_PITCH):
@@ -196,7 +189,6 @@ class _Row:
         return LineSensor((pitch[0], pitch[1]), cells.get("s0", cells.get("width", 0) / 2), x0, y0)
 
     def shutter(self, camera: Camera) -> Shutter | None:
-        """Return the rolling shutter; None without."""
         table, row, cells, settings = self.table, self.row, self.cells, self.tables.settings
         if "readout" not in cells:
             if cells.keys() & {"readout_direction", "shutter"} or cells.get("sd_readout"):
@@ -279,15 +271,22 @@ class _Row:
         if size is None and "w" in own:
             need = {"name": f"the model {model}", "other": "width and height"}
             raise table.error(row, phrase("error.requires", **need))
-        parameters, deviations = _spread(own, known), _spread(own, self.deviations)
-        signs = signs_in_files([*parameters]).tolist()
-        parameters = {name: sign * parameters[name] for name, sign in zip(parameters, signs, strict=True)}
+        # A single focal length applies to both axes.
+        spread = "f" not in own and "fx" in own
+        parameters, deviations = (
+            {"fx": each["f"], "fy": each["f"], **{k: v for k, v in each.items() if k != "f"}}
+            if spread and "f" in each
+            else each
+            for each in (known, self.deviations)
+        )
         if strange := [name for name in parameters if name not in own and parameters[name] != 0]:
             raise table.error(row, unknown_name(f"parameter of the model {model}", strange[0], powers))
         values, sd = (
             {own[k]: v / parts ** powers[own[k]] for k, v in each.items() if k in own}
             for each in (parameters, deviations)
         )
+        signs = signs_in_files([*values]).tolist()
+        values = {name: sign * values[name] for name, sign in zip(values, signs, strict=True)}
         if size is not None and image == "px":
             if "w" in own:
                 values |= {own["w"]: float(size[0]), own["h"]: float(size[1])}
@@ -312,33 +311,7 @@ class _Row:
         return single
 
 
-def _spread(own: dict[str, str], values: dict[str, float]) -> dict[str, float]:
-    """Return values by parameter; a single focal length applies to both axes."""
-    if "f" in values and "f" not in own and "fx" in own:
-        values = {"fx": values["f"], "fy": values["f"], **{k: v for k, v in values.items() if k != "f"}}
-    return values
-
-
 _ALL = frozenset(name.lower() for facts in _MODELS.values() for name, _ in facts[1])
-
-
-def spread_over_photos(
-    cameras: Cameras, photo_cameras: Sequence[int], photos: Sequence[str], groups: Sequence[str]
-) -> tuple[Cameras, list[int]]:
-    """Create separate cameras for photos or groups as in the table."""
-    if all(each.for_each == "all" for each in cameras.rows):
-        return cameras, list(photo_cameras)
-    places: dict[tuple[int, str], int] = {}
-    of_photos = []
-    for row, photo, group in zip(photo_cameras, photos, groups, strict=True):
-        own = {"all": "", "photo": photo}.get(cameras.rows[row].for_each, group)
-        of_photos.append(places.setdefault((row, own), len(places)))
-    rows = []
-    for row, own in places:
-        camera = cameras.rows[row].camera
-        camera = camera.replace(name=f"{camera.name}/{own}") if own else camera
-        rows.append(cameras.rows[row]._replace(camera=camera))
-    return Cameras(rows, cameras.certificates), of_photos
 
 
 def knots_table(cameras: Sequence[Camera]) -> dict[str, Any]:
@@ -356,24 +329,24 @@ def knots_table(cameras: Sequence[Camera]) -> dict[str, Any]:
 def with_knots(tables: Tables, cameras: Sequence[Camera]) -> list[Camera]:
     """Return cameras with the knots of the table; missing knots are 0 and fixed."""
     table = tables.rows("knots")
-    splined = {each.name: each.knots for each in cameras if each.knots is not None}
-    values, sd = ({name: np.zeros_like(knots) for name, knots in splined.items()} for _ in range(2))
+    numbers = {each.name: np.zeros((*each.knots.shape[:2], 4)) for each in cameras if each.knots is not None}
     seen = set[tuple[str, int, int]]()
     for row, cells in enumerate(tables.records("knots", defaults=True)):
         name, i, j = cells["camera"], cells["i"], cells["j"]
-        if name not in splined:
-            raise table.unknown_error(row, "camera", "splined camera", name, splined)
-        rows, count, _ = values[name].shape
+        if name not in numbers:
+            raise table.unknown_error(row, "camera", "splined camera", name, numbers)
+        rows, count, _ = numbers[name].shape
         if not (i in range(count) and j in range(rows)):
             fields = {"camera": name, "columns": count, "rows": rows, "i": i, "j": j}
             raise table.error(row, phrase("plain.knot", **fields))
         if (name, i, j) in seen:
             raise table.error(row, phrase("error.repeated", kind="knot", name=f"{i:g}, {j:g}"))
         seen.add((name, i, j))
-        for found, columns in ((values, ("dx", "dy")), (sd, _SD)):
-            found[name][j, i] = [cells[column] for column in columns]
+        numbers[name][j, i] = [cells[column] for column in ("dx", "dy", *_SD)]
     with at_place(Place(tables.settings.path)):
         return [
-            each.replace(knots=values[each.name], knot_sd=sd[each.name]) if each.name in splined else each
+            each.replace(knots=own[:, :, :2], knot_sd=own[:, :, 2:])
+            if (own := numbers.get(each.name)) is not None
+            else each
             for each in cameras
         ]

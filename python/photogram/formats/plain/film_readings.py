@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.errors import ContradictionError, InputError
-from photogram.film.interior import conformal, is_mirrored, mirror_message, side_residuals, true_places
+from photogram.errors import ContradictionError, InputError, message_of
+from photogram.film.interior import conformal, film_side, is_mirrored, true_places
 from photogram.film.marks import DECIDED, which_mark
+from photogram.formats.plain.film_tables import FilmKind, Machine
 from photogram.formats.plain.photos import Photos
-from photogram.formats.plain.scanners import Machine
+from photogram.formats.plain.schema import deviation_columns
 from photogram.formats.plain.tables import Tables, indices_of
 from photogram.io.column_table import ColumnTable
 from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
+from photogram.network.films import Mark
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
@@ -29,40 +31,6 @@ NEAR = 0.1  # Largest distance in the best placement, relative to the format; po
 TIES = 4  # Smallest number of common points of two photos
 
 
-@dataclass(frozen=True)
-class Lying:
-    """A placement of a film: positions of marks in the camera frame, and side."""
-
-    places: Floats
-    mirrored: bool
-
-    def back(self, true: Floats, images: Floats) -> Floats:
-        """Transform images to (m,) complex camera coordinates."""
-        t1, t2, theta, m = conformal(self.places, true, mirrored=self.mirrored)
-        q = (images @ np.array([1.0, 1j]) - (t1 + 1j * t2)) / ((1.0 + m) * np.exp(1j * theta))
-        return np.asarray(-np.conj(q) if self.mirrored else q)
-
-
-@dataclass(frozen=True)
-class Expected:
-    """Expected positions of images of a photo in the camera frame."""
-
-    rows: np.ndarray  # (m,) rows of the image observations of the photo
-    places: Floats  # (m,) complex, mm
-    # Unknown transformation: none, translation and scale, or these and a rotation
-    but: Literal["nothing", "shift", "rotation"] = "nothing"
-
-    def apart(self, q: Floats) -> float:
-        """Return the root mean square distance of images from expectation."""
-        left = q - self.places
-        if self.but != "nothing":
-            own, other = q - q.mean(), self.places - self.places.mean()
-            turned = np.vdot(other, own)
-            by = turned if self.but == "rotation" else np.linalg.norm(own) * np.linalg.norm(other)
-            left = own - by / np.vdot(other, other) * other
-        return float(np.sqrt(np.mean(np.abs(left) ** 2)))
-
-
 @dataclass
 class ScannedPhoto:
     """A photo on film: its row in the table of photos, its images, and readings of its marks."""
@@ -70,9 +38,9 @@ class ScannedPhoto:
     name: str
     row: int
     camera: str
-    film: str
+    kind: FilmKind  # Of its film
     machine: Machine
-    fiducials: Mapping[str, Floats]  # (2,) positions of the marks of its camera, by name
+    fiducials: Mapping[str, Mark]  # Marks of its camera by name
     given_side: bool | None  # Whether the table marks the photo as mirrored; None: unknown
     images: Floats  # (m, 2) readings of its images
     image_sd: Floats  # (m,) the larger standard deviation of each reading
@@ -90,11 +58,6 @@ class ScannedPhoto:
         """(n, 2) true scanner positions of its marks."""
         return self._true_places(np.array(self.readings))
 
-    @property
-    def true_images(self) -> Floats:
-        """(m, 2) true scanner positions of its images."""
-        return self._true_places(self.images)
-
     def _true_places(self, readings: Floats) -> Floats:
         own = self.machine
         return true_places(readings.reshape(-1, 2), own.readings, own.scanner, own.curves)
@@ -102,52 +65,75 @@ class ScannedPhoto:
     @property
     def places(self) -> Floats:
         """(n, 2) positions of its marks in the camera frame."""
-        return np.array([self.fiducials[name] for name in self.marks]).reshape(-1, 2)
+        return _positions(self.fiducials[name] for name in self.marks)
 
-    @property
-    def in_camera(self) -> Floats | None:
-        """(m,) complex image positions in the camera frame, if marks or side define the placement."""
-        if len(self.marks) < 2 or not all(self.marks):
-            return None
-        side = is_mirrored(self.places, self.true) if self.given_side is None else self.given_side
-        return None if side is None else Lying(self.places, side).back(self.true, self.true_images)
+    def in_camera(self, places: Floats, *, mirrored: bool) -> Floats:
+        """Return (m,) complex image positions in the camera frame by marks at (n, 2) positions."""
+        t1, t2, theta, m = conformal(places, self.true, mirrored=mirrored)
+        p = self._true_places(self.images) @ np.array([1.0, 1j])
+        q = (p - (t1 + 1j * t2)) / ((1.0 + m) * np.exp(1j * theta))
+        return np.asarray(-np.conj(q) if mirrored else q)
 
-    def way_by_images(self, ways: Sequence[Lying], photos: Sequence[ScannedPhoto]) -> int | None:
-        """Return the placement that fits images of known points or tie points; None if not unique."""
-        images, true = self.true_images, self.true
-        for expected in self._expected(photos):
-            if len(expected.rows) < 2:
+    def way_by_images(
+        self, ways: Sequence[tuple[Floats, bool]], photos: Sequence[ScannedPhoto]
+    ) -> int | None:
+        """Return the placement that fits images of known points or tie points; None if not unique.
+
+        Placements are positions of marks in the camera frame, and the side.
+        """
+        images = [self.in_camera(places, mirrored=mirrored) for places, mirrored in ways]
+        for rows, expected, freedom in self._expected(photos):
+            if len(rows) < 2:
                 continue
-            apart = [expected.apart(way.back(true, images[expected.rows])) for way in ways]
+            apart = [_apart(q[rows], expected, freedom) for q in images]
             order = np.argsort(apart)
             best = apart[order[0]]
-            near = best <= NEAR * float(np.ptp(ways[0].places, axis=0).max())
+            near = best <= NEAR * float(np.ptp(ways[0][0], axis=0).max())
             if near and (len(ways) == 1 or apart[order[1]] > BETTER * best):
                 return int(order[0])
         return None
 
-    def _expected(self, photos: Sequence[ScannedPhoto]) -> Iterator[Expected]:
-        """Yield expected image positions: from pose, and from tie points of a photo whose film is placed."""
+    def _expected(self, photos: Sequence[ScannedPhoto]) -> Iterator[tuple[Indices, Floats, str]]:
+        """Yield rows of images, expected positions (complex, mm), and the unknown transformation.
+
+        They follow from the pose, and from tie points of a photo whose film is placed.
+        """
         centre, axes, c = self.pose
         places = _projected((self.coordinates - centre) @ axes, c)
         known = np.flatnonzero(np.isfinite(places))
-        yield Expected(known, places[known])
+        yield known, places[known], "none"
         ties = [(len(np.intersect1d(self.points, each.points)), each) for each in photos if each is not self]
         for count, other in sorted(ties, key=lambda tie: -tie[0]):
-            if count < TIES or (film := other.in_camera) is None:
+            if count < TIES or len(other.marks) < 2 or not all(other.marks):
                 continue
-            common = np.intersect1d(self.points, other.points)
-            rows, there = (
-                np.array([np.flatnonzero(own == point)[0] for point in common])
-                for own in (self.points, other.points)
-            )
-            q = film[there]
+            side = other.given_side
+            if side is None and (side := is_mirrored(other.places, other.true)) is None:
+                continue
+            _, rows, there = np.intersect1d(self.points, other.points, return_indices=True)
+            q = other.in_camera(other.places, mirrored=side)[there]
             _, turned, distance = other.pose
             rays = np.column_stack([q.real, q.imag, np.full(len(q), distance)])
             places = _projected(rays @ turned.T @ axes, c)
-            known_turn = np.isfinite(places).all()
-            yield Expected(rows, places, "shift") if known_turn else Expected(rows, q, "rotation")
+            yield (rows, places, "shift") if np.isfinite(places).all() else (rows, q, "rotation")
             return
+
+
+def _positions(marks: Iterable[Mark]) -> Floats:
+    return np.array([mark.position[:2] for mark in marks]).reshape(-1, 2)
+
+
+def _apart(q: Floats, expected: Floats, freedom: str) -> float:
+    """Return the root mean square distance of images from expectation.
+
+    It ignores a translation and scale (`shift`), or these and a rotation (`rotation`).
+    """
+    left = q - expected
+    if freedom != "none":
+        own, other = q - q.mean(), expected - expected.mean()
+        turned = np.vdot(other, own)
+        by = turned if freedom == "rotation" else np.linalg.norm(own) * np.linalg.norm(other)
+        left = own - by / np.vdot(other, other) * other
+    return float(np.sqrt(np.mean(np.abs(left) ** 2)))
 
 
 def _projected(rays: Floats, c: float) -> Floats:
@@ -160,8 +146,7 @@ def read_marks(tables: Tables, photos: Photos, scanned: Sequence[ScannedPhoto]) 
     """Add the readings of marks to scanned photos, with names by position if the table has none."""
     table = tables.rows("fiducial_images")
     names = ("column", "row") if "column" in table else ("x", "y")
-    xy = table.given(names)
-    own = ["sd_column", "sd_row"] if "column" in table else ["sd_x", "sd_y"]
+    xy, own = table.given(names), deviation_columns(names)
     sd = tables.deviations(table, "fiducial_images", own)
     table.check_given(sd, own, "fiducial_images")
     known = [*photos.names, *photos.unused]
@@ -198,13 +183,12 @@ def read_marks(tables: Tables, photos: Photos, scanned: Sequence[ScannedPhoto]) 
 def _name_marks(tables: Tables, photo: ScannedPhoto, photos: Sequence[ScannedPhoto]) -> InputError | None:
     """Identify the marks of a photo; return an error if ambiguous."""
     head, names = tables.rows("fiducial_images").head, list(photo.fiducials)
-    places = np.array(list(photo.fiducials.values())).reshape(-1, 2)
+    places = _positions(photo.fiducials.values())
     with at_place(head, f"photo {photo.name}"):
         found = which_mark(places, photo.true)
     ways = [each for each in found.alike if photo.given_side in (None, each.mirrored)]
     if len(ways) != 1:
-        lying = [Lying(places[way.marks], way.mirrored) for way in ways]
-        chosen = photo.way_by_images(lying, photos)
+        chosen = photo.way_by_images([(places[way.marks], way.mirrored) for way in ways], photos)
         if chosen is None:
             return head.error(phrase("plain.film-pose", photo=photo.name, reason=str(found)))
         ways = [ways[chosen]]
@@ -215,19 +199,18 @@ def _name_marks(tables: Tables, photo: ScannedPhoto, photos: Sequence[ScannedPho
 
 def side_of(tables: Tables, table: ColumnTable, photo: ScannedPhoto, photos: Sequence[ScannedPhoto]) -> bool:
     """Return whether a photo is mirrored: given, by marks, or by images."""
-    given, q = photo.given_side, photo.places
-    true = photo.true if len(q) else q
-    found = is_mirrored(q, true)
-    if given is not None and found is not None and found != given:
-        sides = mirror_message(given, side_residuals(q, true))
-        message = phrase("error.at", what=f"photo {photo.name}", message=sides)
-        raise ContradictionError.of(table.error(photo.row, message))
-    if found is None and given is None and len(q) > 1:
-        chosen = photo.way_by_images([Lying(q, False), Lying(q, True)], photos)
-        found = None if chosen is None else bool(chosen)
-    if given is None and found is None:
+    q = photo.places
+    try:
+        side = film_side(q, photo.true if len(q) else q, photo.given_side)
+    except ContradictionError as error:
+        message = phrase("error.at", what=f"photo {photo.name}", message=message_of(error))
+        raise ContradictionError.of(table.error(photo.row, message)) from None
+    if side is None and len(q) > 1:
+        chosen = photo.way_by_images([(q, False), (q, True)], photos)
+        side = None if chosen is None else bool(chosen)
+    if side is None:
         tables.remark("plain.side-unknown", photo=photo.name)
-    return bool(found if given is None else given)
+    return bool(side)
 
 
 SHRUNK = 0.01  # Largest change of film size, relative
@@ -250,23 +233,24 @@ def scale_message(photo: ScannedPhoto) -> Phrase | None:
     return phrase("plain.scale-of-scan", dpi=round(INCH / meant, -1), **fields)
 
 
-def beyond_message(camera: Camera, own: Certificate, places: Floats, sd: Floats) -> Phrase | None:
-    """Return a remark on images beyond a distortion table with an inaccurate curve.
-
-    `places` are (m,) complex, in the camera frame, and `sd` (m,) their standard deviations, mm.
-    """
+def beyond_message(camera: Camera, own: Certificate, photos: Sequence[ScannedPhoto]) -> Phrase | None:
+    """Return a remark on images of a camera beyond a distortion table with an inaccurate curve."""
     if own.radial is None or own.c is None or len(own.radial.angle) < SHORTEST:
         return None
     if camera.parameters != own.camera(camera.model).parameters:  # type: ignore[arg-type]
         return None
-    radius = np.abs(places - complex(camera.parameters["xp"], camera.parameters["yp"]))
+    photos = [photo for photo in photos if photo.camera == camera.name and len(photo.marks) > 1]
+    places = [photo.in_camera(photo.places, mirrored=photo.mirrored) for photo in photos]
+    point = complex(camera.parameters["xp"], camera.parameters["yp"])
+    radius = np.abs(np.concatenate([np.zeros(0), *places]) - point)
+    sd = np.concatenate([np.zeros(0), *(photo.machine.readings.pitch * photo.image_sd for photo in photos)])
     last, curve = own.c * float(np.tan(own.radial.angle.max())), own.curve()
     beyond = radius[(radius > last) & (curve.sd_at(radius) > sd)]
     if not len(beyond):
         return None
     farthest = beyond.max(keepdims=True)
     sd_um = 1e3 * float(curve.sd_at(farthest)[0])
-    fields = {"camera": camera.name, "n": len(beyond), "all": len(places), "last": last, "sd_um": sd_um}
+    fields = {"camera": camera.name, "n": len(beyond), "all": len(radius), "last": last, "sd_um": sd_um}
     return phrase("plain.beyond-distortion", farthest=float(farthest[0]), **fields)
 
 
@@ -298,7 +282,7 @@ def _round(photos: Sequence[ScannedPhoto]) -> Iterator[Phrase]:
             continue
         names = list(photo.fiducials)
         try:
-            found = which_mark(np.array([*photo.fiducials.values()]), photo.true)
+            found = which_mark(_positions(photo.fiducials.values()), photo.true)
         except InputError:
             continue
         own = [names.index(mark) for mark in photo.marks]

@@ -4,22 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import ContradictionError, InputError
-from photogram.film.interior import (
-    FilmModel,
-    conformal,
-    interior_orientation,
-)
+from photogram.film.interior import FilmModel, conformal, interior_orientation
 from photogram.formats.images import scaled_camera
 from photogram.formats.plain.cameras import Cameras
-from photogram.formats.plain.certificates import marks_of, read_fiducials
 from photogram.formats.plain.film_readings import (
-    Lying,
     ScannedPhoto,
     beyond_message,
     mark_remarks,
@@ -27,21 +22,26 @@ from photogram.formats.plain.film_readings import (
     scale_message,
     side_of,
 )
-from photogram.formats.plain.photos import Images, Photos
-from photogram.formats.plain.scanners import (
+from photogram.formats.plain.film_tables import (
+    FilmKind,
     Machine,
+    Marks,
     film_cells,
     machines_of,
+    marks_of,
+    read_fiducials,
     read_films,
     read_scanners,
+    roll_of,
     scanner_cells,
 )
+from photogram.formats.plain.photos import Images, Photos
 from photogram.formats.plain.schema import deviation_columns
 from photogram.formats.plain.tables import Tables, columns_of, columns_of_records, made, signs_in_files
 from photogram.formats.plain.unknowns import Covariances
 from photogram.formats.project import Project
-from photogram.io.column_table import FALSE, TRUE
-from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.io.column_table import FALSE, TRUE, ColumnTable
+from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
 from photogram.network.films import (
     Film,
@@ -62,16 +62,15 @@ INSIDE = "films inside"
 """Key of a detail of a project with fixed films: the complete contents of their tables."""
 
 
-@dataclass(frozen=True)
-class Scanned:
+class Scanned(NamedTuple):
     """Scanned photos with the transformations of their images and their observations."""
 
     photos: Bools  # (P,) whether photos are scanned
-    scans: list[Scan] = field(default_factory=list)  # Transformations of image coordinates
-    observations: list[Observation] = field(default_factory=list)
+    scans: Sequence[Scan] = ()  # Transformations of image coordinates
+    observations: Sequence[Observation] = ()
     # If films are fitted in advance: the complete scans and observations for the details of the project, from
     # which tables are written
-    inside: dict[str, tuple[list[Scan], list[Observation]]] = field(default_factory=dict)
+    inside: Mapping[str, tuple[list[Scan], list[Observation]]] = MappingProxyType({})
 
 
 def read_scanned(
@@ -81,214 +80,213 @@ def read_scanned(
 
     `points` are the (n, 3) coordinates of all points of the images; NaN where unknown.
     """
-    films = photos.table.texts("film")
-    scanned = np.array([bool(name) for name in films], dtype=bool)
-    for table in ("fiducial_images", "fiducials", "films", "scanners"):
-        if table in tables.settings.tables and not scanned.any():
-            path = tables.settings.tables[table]
-            raise InputError(phrase("plain.no-film", table=table), file=path)
-    found = Scanned(scanned)
-    if scanned.any():
-        if tables.settings.image == "um":
-            raise InputError(phrase("plain.film-unit"), file=tables.settings.path)
-        reader = _Reader(tables, photos, cameras, covariances)
-        reader.photos = reader.scanned_photos(images, points)
-        read_marks(tables, photos, reader.photos)
-        reader.read(found)
-        if tables.settings.interior == "before":
-            inside = {INSIDE: (found.scans, found.observations)}
-            return Scanned(scanned, reader.fitted(found.scans), inside=inside)
+    scanned = np.array([bool(name) for name in photos.table.texts("film")], dtype=bool)
+    if not scanned.any():
+        for name in ("fiducial_images", "fiducials", "films", "scanners"):
+            if name in tables.settings.tables:
+                raise InputError(phrase("plain.no-film", table=name), file=tables.settings.tables[name])
+        return Scanned(scanned)
+    if tables.settings.image == "um":
+        raise InputError(phrase("plain.film-unit"), file=tables.settings.path)
+    machines = read_scanners(tables, covariances)
+    names = [*dict.fromkeys(filter(None, photos.table.texts("film")))]
+    kinds = read_films(tables, names, tables.settings.film)
+    fiducials = read_fiducials(tables, set(photos.taken), cameras.certificates)
+    films = _scanned_photos(photos, cameras, images, points, machines, kinds, fiducials)
+    read_marks(tables, photos, films)
+    starts = _starts(tables, photos.table, cameras, films)
+    scans = [Scan(photo.name, _film(photo, start)) for photo, start in zip(films, starts, strict=True)]
+    observations = _observations(tables, films, scans, fiducials, covariances)
+    if tables.settings.interior == "before":
+        return Scanned(scanned, _fitted(photos.table, films, scans), (), {INSIDE: (scans, observations)})
+    return Scanned(scanned, scans, observations)
+
+
+def _scanned_photos(
+    photos: Photos,
+    cameras: Cameras,
+    images: Images,
+    points: Floats,
+    machines: Mapping[str, Machine],
+    kinds: Mapping[str, FilmKind],
+    fiducials: Mapping[str, Marks],
+) -> list[ScannedPhoto]:
+    table, found = photos.table, []
+    comparator = Machine(Scanner("comparator", sd=0.0), (), Readings(), None)
+    scanners, sides = table.texts("scanner"), table.texts("mirrored")
+    sd = np.ones(len(images.xy)) if images.sd is None else images.sd.max(axis=1)
+    for row, film in enumerate(table.texts("film")):
+        if not film:
+            continue
+        name, side, camera = scanners[row], sides[row].lower(), photos.taken[row]
+        if name not in machines and (name or len(machines) > 1):
+            raise table.unknown_error(row, "scanner", "scanner", name, machines)
+        if side and side not in TRUE | FALSE:
+            raise table.cell_error(row, "mirrored", "error.flag", value=side)
+        own = np.flatnonzero(images.photos == row)
+        c = -abs(cameras.cameras[photos.cameras[row]].parameters.get("c", np.nan))
+        found.append(
+            ScannedPhoto(
+                photos.names[row],
+                row,
+                camera,
+                kinds[film],
+                machines[name] if name else next(iter(machines.values()), comparator),
+                fiducials[camera].marks if camera in fiducials else {},
+                side in TRUE if side else None,
+                images.xy[own],
+                sd[own],
+                images.points[own],
+                points[images.points[own]],
+                (photos.centres[row], photos.matrices[row], c),
+            )
+        )
     return found
 
 
-class _Reader:
-    def __init__(self, tables: Tables, photos: Photos, cameras: Cameras, covariances: Covariances) -> None:
-        self.tables, self.table, self.covariances = tables, photos.table, covariances
-        self.all_photos, self.cameras = photos, cameras
-        self.machines = read_scanners(tables, covariances)
-        self.films = photos.table.texts("film")
-        self.kinds = read_films(tables, list(dict.fromkeys(filter(None, self.films))), tables.settings.film)
-        self.fiducials = read_fiducials(tables, set(photos.taken), cameras.certificates)
-        self.photos: list[ScannedPhoto] = []
-
-    def scanned_photos(self, images: Images, points: Floats) -> list[ScannedPhoto]:
-        """Return the photos on film with their images."""
-        photos, table = self.all_photos, self.table
-        comparator = Machine(Scanner("comparator", sd=0.0), (), Readings(), None)
-        scanners, sides = table.texts("scanner"), table.texts("mirrored")
-        sd = np.ones(len(images.xy)) if images.sd is None else images.sd.max(axis=1)
-        places = {
-            camera: {name: mark.position[:2] for name, mark in own.marks.items()}
-            for camera, own in self.fiducials.items()
-        }
-        found = []
-        for row, film in enumerate(self.films):
-            if not film:
-                continue
-            name, side = scanners[row], sides[row].lower()
-            if name not in self.machines and (name or len(self.machines) > 1):
-                raise table.unknown_error(row, "scanner", "scanner", name, self.machines)
-            machine = self.machines[name] if name else next(iter(self.machines.values()), comparator)
-            if side and side not in TRUE | FALSE:
-                raise table.cell_error(row, "mirrored", "error.flag", value=side)
-            own = np.flatnonzero(images.photos == row)
-            c = -abs(self.cameras.cameras[photos.cameras[row]].parameters.get("c", np.nan))
-            found.append(
-                ScannedPhoto(
-                    photos.names[row],
-                    row,
-                    photos.taken[row],
-                    film,
-                    machine,
-                    places.get(photos.taken[row], {}),
-                    side in TRUE if side else None,
-                    images.xy[own],
-                    sd[own],
-                    images.points[own],
-                    points[images.points[own]],
-                    (photos.centres[row], photos.matrices[row], c),
-                )
-            )
-        return found
-
-    def read(self, found: Scanned) -> None:
-        """Add the scans and observations of all photos to the result."""
-        self._place_films()
-        cameras = {each.name: each for each in self.cameras.cameras}
-        for camera, certificate in self.cameras.certificates.items():
-            places, sd = [np.zeros(0, dtype=complex)], [np.zeros(0)]
-            for photo in self.photos:
-                if photo.camera == camera and len(photo.marks) > 1:
-                    places.append(Lying(photo.places, photo.mirrored).back(photo.true, photo.true_images))
-                    sd.append(photo.machine.readings.pitch * photo.image_sd)
-            beyond = beyond_message(cameras[camera], certificate, np.concatenate(places), np.concatenate(sd))
-            if beyond:
-                self.tables.messages.append(Message(beyond, certificate.file))
-        starts = [self._start(photo) for photo in self.photos]
-        for photo, start in zip(self.photos, starts, strict=True):
-            film = self._film(photo, start)
-            found.scans.append(Scan(photo.name, film))
-            found.observations.extend(self._known(photo, film))
-            if isinstance(film.pattern, Reseau):
-                found.observations.append(
-                    KnownTogether("reseau", film.pattern.weights, covariance=film.pattern.covariance)
-                )
-            found.observations.extend(
-                Fiducial(photo.name, self.fiducials[photo.camera].marks[name], film, reading, sd=sd)
-                for name, reading, sd in zip(photo.marks, photo.readings, photo.sd, strict=True)
-            )
-            model = self.kinds[photo.film].model
-            if len(photo.marks) < LEAST[model] and self.tables.settings.interior != "before":
-                fields = {"photo": photo.name, "n": len(photo.marks), "least": LEAST[model], "model": model}
-                self.tables.remark("plain.few-fiducials", **fields)
-        for camera, own in self.fiducials.items():
-            read = {name for photo in self.photos if photo.camera == camera for name in photo.marks}
-            found.observations.extend(own.known(self.tables, read, self.covariances))
-        machines = {id(each.machine): each.machine for each in self.photos}
-        found.observations.extend(each.known for each in machines.values() if each.known is not None)
-
-    def _place_films(self) -> None:
-        """Find the side of each photo, and initial values of t1, t2 and theta, from table and marks."""
-        given = self.table.vectors(_START)
-        for photo in self.photos:
-            photo.mirrored = side_of(self.tables, self.table, photo, self.photos)
-            if message := scale_message(photo):
-                raise ContradictionError.of(self.table.error(photo.row, message))
-            if not np.isnan(given[photo.row]).any():
-                photo.start = given[photo.row]
-            elif len(photo.marks) > 1:
-                photo.start = np.array(conformal(photo.places, photo.true, mirrored=photo.mirrored)[:3])
-        # The camera frame of a stellar calibration is the one of the measured plate.
-        stars = {each.name for each in self.cameras.cameras if each.image_y == "down"}
-        found = [each for each in self.photos if each.camera not in stars and each.given_side is None]
-        remarks = mark_remarks(self.photos, [photo.name for photo in found if photo.mirrored])
-        self.tables.messages.extend(Message(each, self.table.path) for each in remarks)
-
-    def _start(self, photo: ScannedPhoto) -> Floats:
-        """Return initial values of a photo, or of the nearest one on its film and scanner."""
-        if photo.start is not None:
-            return photo.start
-        for other in sorted(self.photos, key=lambda each: abs(each.row - photo.row)):
-            same = other.film == photo.film and other.machine is photo.machine
-            if other.start is not None and same and other.mirrored == photo.mirrored:
-                self.tables.remark("plain.film-start", photo=photo.name, other=other.name)
-                return other.start
-        message = phrase("plain.no-film-start", photo=photo.name, columns=list(_START))
-        raise self.table.error(photo.row, message)
-
-    def _film(self, photo: ScannedPhoto, start: Floats) -> Film:
-        kind, machine = self.kinds[photo.film], photo.machine
-        fixed = np.array(kind.sd_size) == 0
-        roll = kind.roll if fixed[0] else None
-        size, bend = [0.0 if fixed[0] else float(kind.roll.position[0]), 0.0, 0.0], None
-        if kind.model == "conformal":
-            fixed[1:] = True
-        if kind.model in ("bilinear", "projective"):
-            bend = FilmBend(photo.name, np.zeros(2), np.array(kind.sd_bend))
-        return Film(
-            FilmPlacement(photo.name, start),
-            FilmSize(photo.name, size, np.where(fixed, 0.0, np.inf)),
-            machine.scanner,
-            machine.readings,
-            bend=bend,
-            projective=kind.model == "projective",
-            roll=roll,
-            curves=machine.curves,
-            pattern=kind.pattern if kind.reseau is None else kind.reseau(photo.name),
-            mirrored=photo.mirrored,
+def _starts(
+    tables: Tables, table: ColumnTable, cameras: Cameras, photos: Sequence[ScannedPhoto]
+) -> list[Floats]:
+    """Find the side of each photo; return initial values of t1, t2 and theta, from table and marks."""
+    given = table.vectors(_START)
+    for photo in photos:
+        photo.mirrored = side_of(tables, table, photo, photos)
+        if message := scale_message(photo):
+            raise ContradictionError.of(table.error(photo.row, message))
+        if not np.isnan(given[photo.row]).any():
+            photo.start = given[photo.row]
+        elif len(photo.marks) > 1:
+            photo.start = np.array(conformal(photo.places, photo.true, mirrored=photo.mirrored)[:3])
+    # The camera frame of a stellar calibration is the one of the measured plate.
+    by_name = {each.name: each for each in cameras.cameras}
+    unsided = [each for each in photos if each.given_side is None and by_name[each.camera].image_y != "down"]
+    remarks = mark_remarks(photos, [photo.name for photo in unsided if photo.mirrored])
+    tables.messages.extend(Message(each, table.path) for each in remarks)
+    for name, certificate in cameras.certificates.items():
+        if beyond := beyond_message(by_name[name], certificate, photos):
+            tables.messages.append(Message(beyond, certificate.file))
+    starts = []
+    for photo in photos:
+        # The nearest photo on the same film and scanner
+        near = sorted(photos, key=lambda other, row=photo.row: abs(other.row - row))  # type: ignore[misc]
+        alike = (
+            other
+            for other in near
+            if (other.kind is photo.kind and other.machine is photo.machine)
+            and (other.start is not None and other.mirrored == photo.mirrored)
         )
+        if (start := photo.start) is None:
+            if (other := next(alike, None)) is None:
+                message = phrase("plain.no-film-start", photo=photo.name, columns=list(_START))
+                raise table.error(photo.row, message)
+            tables.remark("plain.film-start", photo=photo.name, other=other.name)
+            start = other.start
+        assert start is not None
+        starts.append(start)
+    return starts
 
-    def fitted(self, scans: Sequence[Scan]) -> list[Scan]:
-        """Return fixed films, fitted to their marks only, with fixed scanners."""
-        scanners: dict[int, Machine] = {}
-        found = []
-        for photo, scan in zip(self.photos, scans, strict=True):
-            kind, film, machine = self.kinds[photo.film], scan.film, photo.machine
-            reseau = kind.reseau
-            model: FilmModel = kind.model  # type: ignore[assignment]
-            fit = made(
-                self.table,
-                photo.row,
-                interior_orientation,
-                photo.places,
-                np.array(photo.readings).reshape(-1, 2),
-                model,
-                sd=np.array(photo.sd),
-                counted=machine.readings,
-                scanner=machine.scanner,
-                curves=machine.curves,
-                mirrored=film.mirrored,
-                reseau=None if reseau is None else reseau(photo.name),
-            )
-            fixed = scanners.setdefault(id(machine), machine.held())
-            film = replace(
-                film,
-                placement=FilmPlacement(photo.name, fit.film[:3], 0.0),
-                size=FilmSize(photo.name, fit.film[3:].tolist(), np.zeros(3)),
-                scanner=fixed.scanner,
-                curves=fixed.curves,
-                roll=None,
-                bend=None if film.bend is None else FilmBend(photo.name, fit.bend, np.zeros(2)),
-                pattern=None if reseau is None else reseau(photo.name, fit.shifts),
-            )
-            found.append(Scan(photo.name, film))
-        return found
 
-    def _known(self, photo: ScannedPhoto, film: Film) -> list[Observation]:
-        """Return prior observations of a film; empty if it is free."""
-        kind = self.kinds[photo.film]
-        roll = None if film.roll is not None else kind.roll
-        fixed = film.size.deviations == 0
-        sd = {name: kind.sd_size[k] for k, name in enumerate(FILM[3:]) if not fixed[k]}
-        sd = {name: own for name, own in sd.items() if math.isfinite(own)}
-        sizes = 0.0 if roll is not None else float(kind.roll.position[0]), 0.0, 0.0
-        values = dict(zip(FILM, (*film.placement.position.tolist(), *sizes), strict=True))
-        own = photo.name, film.placement, film.size, roll
-        if (covariance := self.covariances.over("film", photo.name, FILM)) is not None:
-            return [KnownFilm(*own, FILM, list(values.values()), covariance=covariance)]
-        if not sd:
-            return []
-        return [KnownFilm(*own, [*sd], [values[name] for name in sd], sd=[*sd.values()])]
+def _observations(
+    tables: Tables,
+    photos: Sequence[ScannedPhoto],
+    scans: Sequence[Scan],
+    fiducials: Mapping[str, Marks],
+    covariances: Covariances,
+) -> list[Observation]:
+    """Return the readings of marks, and the priors of films, marks and scanners."""
+    found = list[Observation]()
+    for photo, film in ((photo, scan.film) for photo, scan in zip(photos, scans, strict=True)):
+        found += _known(photo, film, covariances)
+        if isinstance(film.pattern, Reseau):
+            reseau = film.pattern
+            found.append(KnownTogether("reseau", reseau.weights, covariance=reseau.covariance))
+        found += (
+            Fiducial(photo.name, photo.fiducials[name], film, reading, sd=sd)
+            for name, reading, sd in zip(photo.marks, photo.readings, photo.sd, strict=True)
+        )
+        model = photo.kind.model
+        if len(photo.marks) < LEAST[model] and tables.settings.interior != "before":
+            fields = {"photo": photo.name, "n": len(photo.marks), "least": LEAST[model], "model": model}
+            tables.remark("plain.few-fiducials", **fields)
+    for camera, own in fiducials.items():
+        read = {name for photo in photos if photo.camera == camera for name in photo.marks}
+        found += own.known(tables, read, covariances)
+    machines = {id(each.machine): each.machine for each in photos}
+    return [*found, *(each.known for each in machines.values() if each.known is not None)]
+
+
+def _film(photo: ScannedPhoto, start: Floats) -> Film:
+    kind, machine = photo.kind, photo.machine
+    fixed = np.array(kind.sd_size) == 0
+    roll = kind.roll if fixed[0] else None
+    size = [0.0 if fixed[0] else float(kind.roll.position[0]), 0.0, 0.0]
+    if kind.model == "conformal":
+        fixed[1:] = True
+    return Film(
+        FilmPlacement(photo.name, start),
+        FilmSize(photo.name, size, np.where(fixed, 0.0, np.inf)),
+        machine.scanner,
+        machine.readings,
+        bend=FilmBend(photo.name, np.zeros(2), np.array(kind.sd_bend)) if kind.sd_bend else None,
+        projective=kind.model == "projective",
+        roll=roll,
+        curves=machine.curves,
+        pattern=kind.pattern(photo.name),
+        mirrored=photo.mirrored,
+    )
+
+
+def _fitted(table: ColumnTable, photos: Sequence[ScannedPhoto], scans: Sequence[Scan]) -> list[Scan]:
+    """Return fixed films, fitted to their marks only, with fixed scanners."""
+    scanners: dict[int, Machine] = {}
+    found = []
+    for photo, film in ((photo, scan.film) for photo, scan in zip(photos, scans, strict=True)):
+        machine, reseau = photo.machine, film.pattern if isinstance(film.pattern, Reseau) else None
+        model: FilmModel = photo.kind.model  # type: ignore[assignment]
+        fit = made(
+            table,
+            photo.row,
+            interior_orientation,
+            photo.places,
+            np.array(photo.readings).reshape(-1, 2),
+            model,
+            sd=np.array(photo.sd),
+            counted=machine.readings,
+            scanner=machine.scanner,
+            curves=machine.curves,
+            mirrored=film.mirrored,
+            reseau=reseau,
+        )
+        fixed = scanners.setdefault(id(machine), machine.held())
+        film = replace(
+            film,
+            placement=FilmPlacement(photo.name, fit.film[:3], 0.0),
+            size=FilmSize(photo.name, fit.film[3:].tolist(), np.zeros(3)),
+            scanner=fixed.scanner,
+            curves=fixed.curves,
+            roll=None,
+            bend=None if film.bend is None else FilmBend(photo.name, fit.bend, np.zeros(2)),
+            pattern=None if reseau is None else reseau.with_shifts(fit.shifts),
+        )
+        found.append(Scan(photo.name, film))
+    return found
+
+
+def _known(photo: ScannedPhoto, film: Film, covariances: Covariances) -> list[Observation]:
+    """Return prior observations of a film; empty if it is free."""
+    roll = photo.kind.roll if film.roll is None else None
+    sizes = 0.0 if roll is not None else float(photo.kind.roll.position[0]), 0.0, 0.0
+    values = dict(zip(FILM, (*film.placement.position.tolist(), *sizes), strict=True))
+    own = photo.name, film.placement, film.size, roll
+    if (covariance := covariances.over("film", photo.name, FILM)) is not None:
+        return [KnownFilm(*own, FILM, list(values.values()), covariance=covariance)]
+    free = film.size.deviations != 0
+    sd = {
+        name: one
+        for name, one, weighted in zip(FILM[3:], photo.kind.sd_size, free, strict=True)
+        if weighted and math.isfinite(one)
+    }
+    return [KnownFilm(*own, [*sd], [values[name] for name in sd], sd=[*sd.values()])] if sd else []
 
 
 def on_film(cameras: Cameras, photos: Photos, scanned: Scanned, messages: list[Message]) -> Cameras:
@@ -333,13 +331,7 @@ class WrittenFilms:
         together = [each for each in observations if isinstance(each, KnownTogether)]
         self.machines = machines_of(self.films.values(), together)
         self.certificates = marks_of(self.readings, together, camera_of)
-        self.by_mark = {
-            id(mark): name for own in self.certificates.values() for name, mark in own.marks.items()
-        }
-        self._rolls = {
-            photo: self.known[photo].roll if film.roll is None and photo in self.known else film.roll
-            for photo, film in self.films.items()
-        }
+        self.by_mark = {mark: name for own in self.certificates.values() for name, mark in own.marks.items()}
 
     @property
     def pixels(self) -> bool:
@@ -347,19 +339,18 @@ class WrittenFilms:
         return any(each.readings.pitch != 1.0 for each in self.films.values())
 
     def tables(self) -> dict[str, dict[str, Any]]:
-        """Return the tables of films by name."""
         names = ("column", "row") if self.pixels else ("x", "y")
         if any(each.precision[0, 1] for each in self.readings):
             raise InputError(phrase("plain.correlated-readings"))
         readings = (
-            {"photo": each.photo, "fiducial": self.by_mark[id(each.mark)]}
+            {"photo": each.photo, "fiducial": self.by_mark[each.mark]}
             | columns_of(names, each.observed[:2])
             | columns_of(deviation_columns(names), np.sqrt(np.diag(each.precision)))
             for each in self.readings
         )
         films: dict[str, dict[str, Any]] = {}  # One row for all photos of a roll
         for photo, film in self.films.items():
-            cells = {"film": "film"} | film_cells(film, self._rolls[photo], self._sizes(photo))
+            cells = film_cells(film, self.known.get(photo))
             row = films.setdefault(cells["film"], cells)
             if any(None not in (row.get(key), cell) and row.get(key) != cell for key, cell in cells.items()):
                 raise InputError(phrase("plain.film-differs", film=cells["film"], photo=photo))
@@ -377,7 +368,8 @@ class WrittenFilms:
         """Return the columns of photos; empty without films."""
         rows: dict[str, dict[str, Any]] = {photo: {} for photo in self.photos}
         for photo, film in self.films.items():
-            known, roll, start = self.known.get(photo), self._rolls[photo], film.placement.position
+            known, start = self.known.get(photo), film.placement.position
+            roll = roll_of(film, known)
             if known is not None and known.covariance is not None:
                 start = np.asarray(known.values, dtype=float)[:3]
             rows[photo] = {"film": "film" if roll is None else roll.name, "scanner": film.scanner.name}
@@ -398,17 +390,3 @@ class WrittenFilms:
             if marks.covariance is not None:
                 found.append(("fiducials", camera, marks.words, marks.covariance))
         return found
-
-    def _sizes(self, photo: str) -> Mapping[str, float | None]:
-        """Return standard deviations of m, b1, b2; None with covariances."""
-        known, sd = self.known.get(photo), self.films[photo].size.deviations
-        if known is not None and known.covariance is not None:
-            if tuple(known.known) != FILM:
-                raise InputError(phrase("plain.film-covariance", name=known.name, names=list(FILM)))
-            return {name: None if own else 0.0 for name, own in zip(FILM[3:], sd, strict=True)}
-        found = dict(zip(FILM[3:], np.where(sd == 0, 0.0, np.inf).tolist(), strict=True))
-        if known is None:
-            return found
-        if not set(known.known) <= set(found) or np.any(known.values):
-            raise InputError(phrase("plain.film-priors", name=known.name))
-        return found | dict(zip(known.known, np.sqrt(np.diag(known.precision)).tolist(), strict=True))

@@ -57,8 +57,6 @@ _Columns = dict[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class Known:
-    """The objects to which observations refer."""
-
     points: Mapping[str, int]  # Rows by name
     photos: Mapping[str, int]
     times: Sequence[float]  # Times of photos in seconds; NaN without

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
-from typing import Any
+from functools import cached_property, partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,14 +43,16 @@ class Photos:
     matrices: Floats
     position_sd: Floats
     attitude_sd: Floats
-    groups: list[str]
-    times: Floats
     unused: frozenset[str]
     observed: list[Observation | Observations[Any]]
 
+    @cached_property
+    def rows(self) -> dict[str, int]:
+        """Rows by name."""
+        return {name: row for row, name in enumerate(self.names)}
+
 
 def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photos:
-    """Read the table of photos; raises the errors of :func:`read`."""
     table = tables.read("photos")
     assert table is not None  # The table of images names photos, too
     everything, use = table.names_once("photo"), table.flags("use")
@@ -62,10 +64,8 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     flown = np.array([bool(each) for each in table.texts("trajectory")], dtype=bool)
     sd = tables.deviations(table, "photos", SD_AXES, math.inf)
     sd[flown] = table.vectors(SD_AXES, math.inf, infinite=True)[flown]
-    weighted = np.isfinite(sd) & np.isnan(centres)
-    if weighted.any():
-        row, axis = np.argwhere(weighted)[0].tolist()
-        raise table.cell_error(row, f"sd_{AXES[axis]}", "plain.sd-alone", value=AXES[axis])
+    for row, axis in np.argwhere(np.isfinite(sd) & np.isnan(centres))[:1].tolist():
+        raise table.cell_error(row, SD_AXES[axis], "plain.sd-alone", value=AXES[axis])
     if "photos" in tables.settings.crs and np.isfinite(sd).any():
         raise table.head.error(phrase("plain.sd-with-crs"))
     centres, _ = transform.positions("photos", centres, None, table)
@@ -85,8 +85,6 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
         matrices,
         sd,
         attitude_sd,
-        table.texts("group"),
-        table.numbers("time"),
         unused,
         list(made_of_rows(table, Attitude, observed)),
     )
@@ -97,11 +95,28 @@ def cameras_of(table: ColumnTable, names: Sequence[str]) -> list[int]:
     only = names[0] if len(names) == 1 else ""
     if "camera" not in table and not only:
         raise table.head.error(phrase("plain.which-camera", count=len(names)))
-    places = {name: row for row, name in enumerate(names)}
     texts = table.texts("camera", only)
-    if (row := next((row for row, name in enumerate(texts) if name not in places), None)) is not None:
-        raise table.unknown_error(row, "camera", "camera", texts[row], places)
+    for row in (row for row, name in enumerate(texts) if name not in names):
+        raise table.unknown_error(row, "camera", "camera", texts[row], names)
+    places = {name: row for row, name in enumerate(names)}
     return [places[name] for name in texts]
+
+
+def spread_over_photos(cameras: Cameras, photos: Photos) -> tuple[Cameras, list[int]]:
+    """Create separate cameras for photos or groups as in the table."""
+    if all(each.for_each == "all" for each in cameras.rows):
+        return cameras, photos.cameras
+    places: dict[tuple[int, str], int] = {}
+    of_photos, groups = [], photos.table.texts("group")
+    for row, photo, group in zip(photos.cameras, photos.names, groups, strict=True):
+        own = {"all": "", "photo": photo}.get(cameras.rows[row].for_each, group)
+        of_photos.append(places.setdefault((row, own), len(places)))
+    rows = []
+    for row, own in places:
+        camera = cameras.rows[row].camera
+        camera = camera.replace(name=f"{camera.name}/{own}") if own else camera
+        rows.append(cameras.rows[row]._replace(camera=camera))
+    return cameras._replace(rows=rows), of_photos
 
 
 def _attitude_weights(
@@ -115,8 +130,7 @@ def _attitude_weights(
     if not any(each in table for each in columns):
         return free, {}
     sd = tables.angles(table, columns, math.inf, infinite=True)
-    if (sd < 0).any():
-        row = int(np.argwhere(sd < 0)[0][0])
+    for row in np.argwhere(sd < 0)[:1, 0].tolist():
         raise table.error(row, phrase("plain.negative-angle-sd", value=float(sd[row].min())))
     unknown = np.isfinite(sd).any(axis=1) & np.isnan(matrices).any(axis=(1, 2))
     check_rows(table, unknown, phrase("plain.no-angles"))
@@ -161,8 +175,8 @@ def images_of(tables: Tables, table: ColumnTable, photos: Photos) -> Images:
         tables.remark("plain.camera-column", table.path)
     xs, ys = ("column", "row") if "column" in table else ("x", "y")
     table.require(xs, ys)
-    places = {name: row for row, name in enumerate(photos.names)}
-    rows = indices_of(table, "photo", places | dict.fromkeys(photos.unused, len(places)), "photo")
+    count = len(photos.names)
+    rows = indices_of(table, "photo", photos.rows | dict.fromkeys(photos.unused, count), "photo")
     names = table.names("point")
     xy = table.given((xs, ys))
     again = repeated_pairs(rows, names.rows, len(names.names))
@@ -170,7 +184,7 @@ def images_of(tables: Tables, table: ColumnTable, photos: Photos) -> Images:
         second = int(again[0])
         first = int(np.flatnonzero((rows == rows[second]) & (names.rows == names.rows[second]))[0])
         raise table.error(second, phrase("plain.image-twice", record=table.records[first]))
-    keep = table.flags("use") & (rows < len(places)) if "use" in table or photos.unused else None
+    keep = table.flags("use") & (rows < count) if "use" in table or photos.unused else None
     given = "images" in tables.settings.sd or any(name in table for name in _OF_IMAGES)
     sd = _image_sd(tables, table, given=given)
     whole = Images(given, rows, names.rows, names.names, xy, sd)
@@ -178,20 +192,15 @@ def images_of(tables: Tables, table: ColumnTable, photos: Photos) -> Images:
         return whole
     if left := int(np.count_nonzero(~keep)):
         tables.remark("plain.unused-images", table.path, n=left)
-    return replace(_some(whole, keep), left=_some(whole, ~keep & (rows < len(places))), used=keep)
+    return replace(_some(whole, keep), left=_some(whole, ~keep & (rows < count)), used=keep)
 
 
 def _some(images: Images, which: Bools) -> Images:
     """Return selected image observations, and the names of their points only."""
     seen, points = np.unique(images.points[which], return_inverse=True)
-    return Images(
-        images.sd_given,
-        images.photos[which],
-        points.reshape(-1),
-        [images.point_names[row] for row in seen.tolist()],
-        images.xy[which],
-        None if images.sd is None else images.sd[which],
-    )
+    names = [images.point_names[row] for row in seen.tolist()]
+    sd = None if images.sd is None else images.sd[which]
+    return Images(images.sd_given, images.photos[which], points.reshape(-1), names, images.xy[which], sd)
 
 
 def _image_sd(tables: Tables, table: ColumnTable, *, given: bool) -> Floats | None:
@@ -207,9 +216,7 @@ def _image_sd(tables: Tables, table: ColumnTable, *, given: bool) -> Floats | No
         return None
     if "level" in table and not own and "sd" not in table:
         found = found * 2.0 ** table.numbers("level", 0.0)[:, np.newaxis]
-    bad = np.argwhere(~((found > 0) & np.isfinite(found)))
-    if len(bad):
-        row = int(bad[0][0])
+    for row in np.argwhere(~((found > 0) & np.isfinite(found)))[:1, 0].tolist():
         raise table.error(row, phrase("plain.image-sd", value=found[row].tolist()))
     return found
 
@@ -250,10 +257,7 @@ class ImageSource:
 _LINES = ("column", "row")
 
 
-@dataclass(frozen=True)
-class Seam:
-    """The line at which a scan was joined."""
-
+class Seam(NamedTuple):
     half: str  # Photo name of the second half
     line: str  # `column` or `row`, and the coordinate at which the second half begins
     at: float
@@ -305,13 +309,13 @@ def _with_halves(table: ColumnTable, seams: Seams) -> ColumnTable:
     more = [row for row, name in enumerate(texts) if name in seams]
     halves, count = [seams[texts[row]].half for row in more], table.count
     found = table.some([*range(count), *more]).with_texts("photo", [*texts, *halves])
-    deviations = {
-        name: np.where(np.arange(found.count) < count, own, np.nan)
-        if isinstance(own := found.cells[name], np.ndarray)
-        else [*table.texts(name), *[""] * len(more)]
-        for name in (each for each in table.columns if each.startswith("sd_"))
-    }
-    return replace(found, cells={**found.cells, **deviations})
+    cells = dict(found.cells)
+    for name in (each for each in table.columns if each.startswith("sd_")):
+        if isinstance(own := cells[name], np.ndarray):
+            cells[name] = np.where(np.arange(found.count) < count, own, np.nan)
+        else:
+            cells[name] = [*table.texts(name), *[""] * len(more)]
+    return replace(found, cells=cells)
 
 
 def mounted_halves(

@@ -15,7 +15,7 @@ from photogram.formats.builder import BlockBuilder
 from photogram.formats.names import NamedValues
 from photogram.formats.plain import SETTINGS
 from photogram.formats.plain.boards import ASSUMED, REGULARISED, TIMES, read_boards
-from photogram.formats.plain.cameras import read_cameras, spread_over_photos
+from photogram.formats.plain.cameras import read_cameras
 from photogram.formats.plain.films import on_film, read_scanned
 from photogram.formats.plain.observations import Known, read_observations
 from photogram.formats.plain.photos import (
@@ -24,6 +24,7 @@ from photogram.formats.plain.photos import (
     images_of,
     mounted_halves,
     read_photos,
+    spread_over_photos,
     with_seams,
 )
 from photogram.formats.plain.rigs import placed, read_frames, read_rigs, read_timed, times_of
@@ -54,7 +55,6 @@ def read(path: Path, options: ReadOptions) -> Project:
 
 
 def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSource]:
-    """Read the tables of a project."""
     settings = tables.settings
     if "images" not in settings.tables:
         raise InputError(phrase("error.missing", name="images.csv"), file=settings.path)
@@ -79,7 +79,7 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     places, control_rows, known = _add_points(block, tables, transform, images, given)
     scanned = read_scanned(tables, images, known, photos, cameras, covariances)
     cameras = on_film(cameras, photos, scanned, tables.messages)
-    cameras, photo_cameras = spread_over_photos(cameras, photos.cameras, photos.names, photos.groups)
+    cameras, photo_cameras = spread_over_photos(cameras, photos)
     source = ImageSource(tables, photos, cameras, np.asarray(photo_cameras), scanned.photos)
     xy, sd = source.converted(images)
     for row, own in enumerate(cameras.rows):
@@ -88,10 +88,9 @@ def read_tables(tables: Tables, options: ReadOptions) -> tuple[Project, ImageSou
     block.position_sd, block.attitude_sd = photos.position_sd, photos.attitude_sd
     owners = {each.name: row for row, each in enumerate(cameras.cameras)}
     owners |= dict(zip(photos.taken, photo_cameras, strict=True))
-    block.rigs(read_frames(tables, rigs, photos.names, photos.taken), owners)
+    block.rigs(read_frames(tables, rigs, photos), owners)
     block.mounts = mounted_halves(seams, block.mounts, timed, photos.names)
-    photo_rows = {name: row for row, name in enumerate(photos.names)}
-    known_objects = Known(places, photo_rows, photos.times.tolist(), trajectories)
+    known_objects = Known(places, photos.rows, photos.table.numbers("time").tolist(), trajectories)
     observations = Observations.of(read_observations(tables, transform, known_objects, rigs))
     boards, bends, regularise = read_boards(tables)
     if trajectories and transform.frame != settings.frame:
@@ -165,7 +164,6 @@ class _Given:
 
 
 def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _Given:
-    """Read a table of control and check points."""
     names = table.names_once("point")
     values = table.vectors(AXES)
     uses = table.words("use", TABLES["control"].words["use"])

@@ -65,16 +65,14 @@ def read_rigs(tables: Tables) -> Mapping[str, Rig]:
     return found
 
 
-def read_frames(
-    tables: Tables, rigs: Mapping[str, Rig], photos: Sequence[str], cameras: Sequence[str]
-) -> list[FrameOf]:
+def read_frames(tables: Tables, rigs: Mapping[str, Rig], photos: Photos) -> list[FrameOf]:
     """Read which photos were taken simultaneously."""
     table = tables.rows("frames")
-    rows = indices_of(table, "photo", {name: row for row, name in enumerate(photos)}, "photo").tolist()
+    rows = indices_of(table, "photo", photos.rows, "photo").tolist()
     found: dict[str, tuple[Rig, dict[str, int]]] = {}
     for row, (photo, cells) in enumerate(zip(rows, tables.records("frames"), strict=True)):
         frame, rig = cells["frame"], rigs[cells["rig"]]
-        sensor = sensor_of(table, row, rig, cells.get("sensor", cameras[photo]))
+        sensor = sensor_of(table, row, rig, cells.get("sensor", photos.taken[photo]))
         first, members = found.setdefault(frame, (rig, {}))
         if first is not rig or sensor in members:
             raise table.error(row, phrase("plain.frame-twice", frame=frame, sensor=sensor))
@@ -93,7 +91,6 @@ def sensor_of(table: ColumnTable, row: int, rig: Rig, sensor: str, column: str =
 
 
 def times_of(tables: Tables, name: str) -> dict[str, float]:
-    """Return the given times of photos in a table."""
     table = tables.rows(name)
     pairs = zip(table.texts("photo"), table.numbers("time").tolist(), strict=True)
     return {photo: time for photo, time in pairs if not math.isnan(time)}
@@ -122,7 +119,12 @@ class Rigs:
     def __init__(self, block: Block, cameras: Sequence[str], times: Mapping[str, float]) -> None:
         self._times, self._mounts = times, block.mounts
         flown = [each.sensor for each in block.timed if each.sensor is not None]
-        self._clocks = _clocks(block)
+        # Clocks of sensors, if all of their photos share one
+        clocks: dict[str, set[Clock | None]] = {each.sensor.name: {None} for each in block.mounts}
+        for timed in block.timed:
+            if timed.sensor is not None:
+                clocks.setdefault(timed.sensor.name, set()).add(timed.offset)
+        self._clocks = {name: own.pop() for name, own in clocks.items() if len(own) == 1}
         of = dict(zip(block.photo_ids, cameras, strict=True))
         pairs = {(each.sensor.name, of[each.frame], of[each.photo]) for each in block.mounts}
         # On trajectories no photo represents a frame, so the rig is unknown.
@@ -168,7 +170,6 @@ class Rigs:
         return None if first is None or first[0] != rig else (rig, first[1], name)
 
     def tables(self, block: Block) -> dict[str, dict[str, Any]]:
-        """Return the tables of rigs, frames and bases."""
         if not self._places:
             return {}
         rows: list[tuple[str, str, Sensor | None]] = []
@@ -198,16 +199,6 @@ class Rigs:
             ),
             "bases": columns_of_records(dict(zip(_BASE, base, strict=True)) for base in self._bases),
         }
-
-
-def _clocks(block: Block) -> dict[str, Clock]:
-    """Return clocks of sensors, if all of their photos share one."""
-    found: dict[str, Clock | None] = {each.sensor.name: None for each in block.mounts}
-    for each in block.timed:
-        name = "" if each.sensor is None else each.sensor.name
-        if name and found.setdefault(name, each.offset) is not each.offset:
-            found[name] = None
-    return {name: clock for name, clock in found.items() if clock is not None}
 
 
 _MOTION = (*VELOCITY, *RATE)
@@ -240,7 +231,7 @@ def read_timed(
     )
     found: list[Timed] = []
     for row, (name, camera, time) in enumerate(
-        zip(photos.names, photos.cameras, photos.times.tolist(), strict=True)
+        zip(photos.names, photos.cameras, table.numbers("time").tolist(), strict=True)
     ):
         rig, sensor, clock = on_rigs[row], None, clocks[row]
         if rig is None and as_sensors[row]:
@@ -305,9 +296,8 @@ def placed(photos: Photos, timed: Sequence[Timed], spheroid: Spheroid | None) ->
     """Return photos with missing poses completed from their trajectories."""
     centres, matrices = photos.centres.copy(), photos.matrices.copy()
     axes = Cartesian(spheroid)
-    places = {name: row for row, name in enumerate(photos.names)}
     for each in timed:
-        row = places[each.photo]
+        row = photos.rows[each.photo]
         if each.trajectory is None or np.isfinite([*centres[row], *matrices[row].ravel()]).all():
             continue
         begin = 0.0 if each.lines is None else float(np.asarray(each.lines.table)[0, 1])
@@ -347,7 +337,6 @@ def moving_columns(block: Block, rigs: Rigs) -> dict[str, Any]:
 
 
 def line_times_table(block: Block) -> dict[str, Any]:
-    """Return the table of line times."""
     return columns_of_records(
         {"photo": each.photo} | columns_of(("line", "time", "seconds_per_line"), row)
         for each in block.timed

@@ -60,7 +60,6 @@ def covariance_columns(names: Sequence[str]) -> dict[str, tuple[int, int]]:
 
 
 def deviation_columns(names: Sequence[str]) -> tuple[str, ...]:
-    """Return the columns of standard deviations of components."""
     return tuple(f"sd_{name}" for name in names)
 
 
@@ -102,7 +101,6 @@ class Column(NamedTuple):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The columns."""
         names = self.components
         if self.kind == "sd":
             return deviation_columns(names) or ("sd",)
@@ -165,7 +163,6 @@ class Parameter(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The column of the name."""
         return self.columns[0].names[0]
 
     @property
@@ -181,8 +178,6 @@ class Parameter(NamedTuple):
 
 @dataclass(frozen=True)
 class Schema:
-    """A table."""
-
     all_columns: tuple[Column, ...]
     class_name: str = ""  # Of the observations of its rows
     # Allowed numbers of standard deviations in `[sd]`; empty: not allowed
@@ -205,31 +200,19 @@ class Schema:
 
     @property
     def unknowns(self) -> list[Parameter]:
-        """The unknowns of a row."""
         return [part for part in self.parts if isinstance(part, Parameter)]
 
     def unknown(self, field: str) -> Parameter:
-        """Return the unknown with a field."""
         return next(part for part in self.unknowns if part.field == field)
 
     @cached_property
-    def required(self) -> tuple[str, ...]:
-        """Required columns."""
-        columns = (column for column in self.all_columns if column.default == REQUIRED)
-        return tuple(name for column in columns for name in column.components)
-
-    @cached_property
-    def texts(self) -> tuple[str, ...]:
-        """Allowed columns of names and words."""
-        return self._names(text=True)
+    def columns(self) -> tuple[str, ...]:
+        texts = [name for column in self.all_columns if column.kind in TEXTS for name in column.names]
+        return (*dict.fromkeys(texts), *self.numbers)
 
     @cached_property
     def numbers(self) -> tuple[str, ...]:
-        """Allowed columns of numbers."""
-        return self._names(text=False)
-
-    def _names(self, *, text: bool) -> tuple[str, ...]:
-        columns = [column for column in self.all_columns if (column.kind in TEXTS) is text]
+        columns = (column for column in self.all_columns if column.kind not in TEXTS)
         return tuple(dict.fromkeys(name for column in columns for name in column.names))
 
     @cached_property
@@ -248,19 +231,15 @@ class Schema:
         columns = (column for column in self.all_columns if column.words)
         return {name: column.words for column in columns for name in column.names}
 
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """All allowed columns."""
-        return self.texts + self.numbers
-
     def needed(self, there: Collection[str]) -> tuple[str, ...]:
         """Return the required columns of a table that has some columns."""
         of_trajectories = "trajectory" in there and self.class_name
-        return tuple(name for name in self.required if name != "photo" or not of_trajectories)
+        columns = (column for column in self.all_columns if column.default == REQUIRED)
+        names = (name for column in columns for name in column.components)
+        return tuple(name for name in names if name != "photo" or not of_trajectories)
 
 
 def _declared() -> Iterator[tuple[str, Schema]]:
-    """Yield the tables of the file."""
     for name, group in groupby(declared(__file__, "tables.csv"), lambda row: row[0]):
         (_, _, class_name, system, deviations, *_), *own = group
         columns = []

@@ -41,8 +41,6 @@ _SOME_LENGTH = {"line": "1", "from": "A", "to": "B", "length": 1.0, "sd": 0.0}
 
 
 class Key(NamedTuple):
-    """A key of `project.toml`."""
-
     section: str
     name: str
     kind: str

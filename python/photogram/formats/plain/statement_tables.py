@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -73,19 +73,17 @@ def with_cover(
 
 def asked_by_other_names(asked: Mapping[str, Any], names: Mapping[str, str]) -> dict[str, Any]:
     """Return the settings of a statement with renamed points."""
-    found = dict(asked)
-    if "vegetated" in found:
-        found["vegetated"] = frozenset(names.get(each, each) for each in found["vegetated"])
-    if "without" in found:
-        found["without"] = {names.get(each, each): reason for each, reason in found["without"].items()}
-    if "lengths" in found:
-        found["lengths"] = tuple(
-            {**each, **{end: names.get(each[end], each[end]) for end in ("from", "to")}}
-            for each in found["lengths"]
-        )
-    if "budgets" in found:
-        found["budgets"] = tuple(_quantity(each, names) for each in found["budgets"])
-    return found
+
+    def rename(name: str) -> str:
+        return names.get(name, name)
+
+    changes: dict[str, Callable[[Any], Any]] = {
+        "vegetated": lambda own: frozenset(map(rename, own)),
+        "without": lambda own: {rename(point): reason for point, reason in own.items()},
+        "lengths": lambda own: tuple({**each, **{end: rename(each[end]) for end in ENDS}} for each in own),
+        "budgets": lambda own: tuple(_quantity(each, names) for each in own),
+    }
+    return {key: changes.get(key, lambda same: same)(own) for key, own in asked.items()}
 
 
 def _quantity(asked: str, names: Mapping[str, str]) -> str:

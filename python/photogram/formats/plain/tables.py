@@ -233,7 +233,6 @@ class Tables:
         return own
 
     def remark(self, code: str, path: Path | None = None, /, **fields: Any) -> None:
-        """Add a remark, optionally on a file."""
         self.messages.append(Message.of(code, path, **fields))
 
     def angle(self, text: str) -> float:
@@ -418,8 +417,6 @@ def angles_of(matrices: Floats, block: Block) -> Floats:
 
 
 class Transform:
-    """Transformation of table coordinates into the frame, in internal units."""
-
     def __init__(self, settings: Settings, messages: list[Message]) -> None:
         self.settings, self._messages = settings, messages
         self.frame = settings.frame

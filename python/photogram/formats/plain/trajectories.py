@@ -46,7 +46,6 @@ Groups = Mapping[tuple[str, ...], Indices]  # Rows of a table by subject
 
 
 def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
-    """Read trajectories by name."""
     table = tables.read("trajectories")
     if table is None:
         if there := [each for each in _OTHERS if each in tables.settings.tables]:
@@ -218,7 +217,6 @@ def shared_trajectories(block: Block) -> list[Trajectory]:
 
 
 def trajectory_tables(block: Block) -> dict[str, dict[str, Any]]:
-    """Return the tables of the trajectories of a block."""
     own = shared_trajectories(block)
     if not own:
         return {}
@@ -305,7 +303,6 @@ def _turns_written(parts: Sequence[tuple[str, Any, Any]], block: Block) -> dict[
 
 
 def smoothness_table(block: Block) -> dict[str, Any]:
-    """Return the table of sums of neighbouring coefficients."""
     own = [(each, place) for each, place in smoothness_beside(block) if place is not None]
     if not own:
         return {}

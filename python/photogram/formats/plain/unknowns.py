@@ -68,7 +68,6 @@ def written_values(block: Block, column: Column, values: Floats) -> dict[str, An
 
 
 def unknown_class(name: str) -> type[Unknown]:
-    """Return a class of unknowns by name."""
     found: type[Unknown] = getattr(unknowns, name, None) or getattr(trajectories, name)
     return found
 
@@ -191,7 +190,6 @@ class Covariances:
         return found
 
     def cameras(self, cameras: Sequence[Camera]) -> list[Camera]:
-        """Return cameras with their covariances."""
         known = {each.name for each in cameras}
         for (kind, name), own in self.parts.items():
             if kind == CAMERA and name not in known:
@@ -200,21 +198,17 @@ class Covariances:
 
     def _camera(self, camera: Camera) -> Camera:
         scale = 1e-3 if self.tables.settings.image == "um" else 1.0
-        signs = signs_in_files(camera.names).tolist()
         units = {
             name.lower(): sign * scale ** camera.powers[name]
-            for name, sign in zip(camera.names, signs, strict=True)
+            for name, sign in zip(camera.names, signs_in_files(camera.names).tolist(), strict=True)
         }
         whole = self._matrix(CAMERA, camera.name, units, f"parameter of the camera {camera.name}")
         words = self.names(CAMERA, camera.name)
         there = [row for row, name in enumerate(camera.names) if name.lower() in words]
         names = [camera.names[row] for row in there]
         # Parameters without standard deviation are fixed, except those in the matrix.
-        sd = {
-            name: own
-            for name, own in zip(camera.names, camera.deviations.tolist(), strict=True)
-            if own or name not in names
-        }
+        deviations = zip(camera.names, camera.deviations.tolist(), strict=True)
+        sd = {name: own for name, own in deviations if own or name not in names}
         given = names, whole[np.ix_(there, there)]
         first = self.parts[CAMERA, camera.name][0][0]
         return made(self.table, first, lambda: camera.replace(sd=sd, covariance=given))

@@ -60,7 +60,6 @@ def cannot_hold(project: Project) -> list[str]:
 
 
 def write(project: Project) -> Mapping[str, bytes]:
-    """Return the files of a project."""
     block = project.block
     cameras, photo_cameras = known_cameras(block)
     rigs = Rigs(block, [cameras[row].name for row in photo_cameras], _times_of(project))
@@ -99,7 +98,6 @@ def write(project: Project) -> Mapping[str, bytes]:
 
 
 def _image_y(project: Project, cameras: Sequence[Camera], exposures: Sequence[Exposure]) -> str:
-    """Return the direction of y: down (corner) or up (centre)."""
     if camera_unit(project.block) != "px":
         return "up"
     sizes, _ = _pictures(project, cameras)
@@ -113,7 +111,6 @@ def _image_y(project: Project, cameras: Sequence[Camera], exposures: Sequence[Ex
 
 
 def _pictures(project: Project, cameras: Sequence[Camera]) -> tuple[list[Size | None], list[float | None]]:
-    """Return image size and pixel size of each camera."""
     if not project.block.cameras:
         # Principal distances are not cameras of the project.
         return [None] * len(cameras), [None] * len(cameras)
@@ -196,7 +193,6 @@ def _photos(project: Project, cameras: list[str], rigs: Rigs) -> dict[str, Any]:
 
 
 def _times_of(project: Project) -> Mapping[str, float]:
-    """Return the times of photos of a board."""
     return project.details.get(TIMES, {}) if project.boards else {}
 
 
@@ -249,7 +245,6 @@ def _images(
 
 
 def control_table(project: Project) -> dict[str, Any]:
-    """Return the columns of control and check points."""
     block, known = project.block, known_points(project)
     if not known.rows:
         return {}
