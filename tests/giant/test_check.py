@@ -14,7 +14,7 @@ from photogram import Spheroid, diagnose, simulate
 from photogram.cli import app
 from photogram.diagnosis.control_sets import exchange
 from photogram.diagnosis.hypotheses import KAPPA, TURNS
-from photogram.diagnosis.structure import parts_of
+from photogram.diagnosis.sections import parts_of
 from photogram.giant import Limits, Project, write_project
 from photogram.giant.checking import check
 from photogram.network.rays import Rays

@@ -17,7 +17,7 @@ from photogram.results.result import Result
 
 if TYPE_CHECKING:
     from photogram.adjustment.first_values import FirstValues
-    from photogram.diagnosis.diagnosis import Diagnosis
+    from photogram.diagnosis.findings import Diagnosis
 
 BAD = 5.0  # Sigma0 above which a converged adjustment is suspect
 
@@ -73,8 +73,7 @@ def remarks(result: Result) -> list[Message]:
 
 def diagnosis_of(result: Result) -> Diagnosis:
     """Return the diagnosis and verdict of an adjustment that failed or fits badly."""
-    from photogram.diagnosis.diagnosis import Diagnosis
-    from photogram.diagnosis.findings import note_all, note_verdict, section_of
+    from photogram.diagnosis.findings import Diagnosis, note_all, note_verdict, section_of
 
     found = diagnosed(result)
     section = section_of("explained")

@@ -13,9 +13,8 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.hypotheses import EXCHANGED, FOOT, with_coordinates
-from photogram.diagnosis.mistakes import Adjuster, Explained, Proposal, explain, omega
+from photogram.diagnosis.mistakes import Adjuster, Explained, Proposal, View, explain, omega
 from photogram.diagnosis.tested_values import mad_sd, outliers, sizes_of_tests, spread_of
-from photogram.diagnosis.views import View
 from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block
 from photogram.network.rays import Rays, local_axes

@@ -4,7 +4,7 @@ Such a mistake makes every observation look wrong. So the check searches for it 
 Later steps use corrected values; the data are not changed.
 
 The criterion is the ratio of the misfit m under a hypothesis to the misfit of the given data
-(:mod:`photogram.diagnosis.regression`). `docs/hints.md` lists hypotheses and limits.
+(:mod:`photogram.diagnosis.predictions`). `docs/hints.md` lists hypotheses and limits.
 """
 
 from __future__ import annotations
@@ -15,20 +15,22 @@ import numpy as np
 
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.hypotheses import hypotheses, turns
-from photogram.diagnosis.mistakes import Proposal
-from photogram.diagnosis.predictions import EACH, SUSPICION, Predicted, predict
-from photogram.diagnosis.regression import (
+from photogram.diagnosis.mistakes import Proposal, View
+from photogram.diagnosis.predictions import (
+    EACH,
     MOST,
+    SUSPICION,
     UNKNOWN,
+    Predicted,
     control_misfit,
     eligible,
     given_points,
     misfits,
+    predict,
     regressions,
     spread,
     view,
 )
-from photogram.diagnosis.views import View
 from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
 from photogram.network.block import Block, checked

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.mistakes import Proposal
-from photogram.diagnosis.regression import Regression, given_points
+from photogram.diagnosis.predictions import given_points
 from photogram.network.attitudes import Attitudes, Representation, angles_form
 from photogram.network.block import Block
 from photogram.words import Phrase, phrase
@@ -55,7 +55,7 @@ def images_turned(block: Block, photos: Bools, turn: Floats) -> Block:
     return block.replace(image_xy=np.where(own, block.image_xy @ turn, block.image_xy))
 
 
-def hypotheses(block: Block, seen: Regression | None = None) -> Iterator[Proposal]:
+def hypotheses(block: Block, seen: Sequence[Floats] | None = None) -> Iterator[Proposal]:
     """Yield possible mistakes of a block; `seen` compares it with predictions."""
     yield from turns(block, np.ones(len(block.photo_ids), dtype=bool))
     composed = None if seen is None else image_hypothesis(block, seen)
@@ -91,16 +91,17 @@ def _of_images(block: Block, shift: Floats, linear: Floats) -> Block:
     return block.replace(image_xy=(block.image_xy - shift) @ linear)
 
 
-def image_hypothesis(block: Block, seen: Regression) -> Proposal | None:
-    """Return another common unit, origin or sense of image coordinates, or None."""
+def image_hypothesis(block: Block, seen: Sequence[Floats]) -> Proposal | None:
+    """Return another common unit, origin or sense of image coordinates by regressions, or None."""
+    scales, turns_seen, shifts, rest = seen
     half = np.ptp(block.image_xy, axis=0).max() / 2
-    scale, shift = float(np.median(seen.scale)), np.median(seen.shift, axis=0)
-    turn = np.round(np.median(seen.turn, axis=0))
+    scale, shift = float(np.median(scales)), np.median(shifts, axis=0)
+    turn = np.round(np.median(turns_seen, axis=0))
     alike = (
-        np.median(seen.rest) < _EXPLAINED
-        and seen.scale.std() < _ALIKE * scale
-        and np.abs(seen.shift - shift).max() < 4 * _ALIKE * half
-        and np.abs(seen.turn - turn).max() < _SHIFTED
+        np.median(rest) < _EXPLAINED
+        and scales.std() < _ALIKE * scale
+        and np.abs(shifts - shift).max() < 4 * _ALIKE * half
+        and np.abs(turns_seen - turn).max() < _SHIFTED
     )
     scaled, shifted = abs(scale - 1) > _SCALED, np.abs(shift).max() > _SHIFTED * half
     if not alike or not (scaled or shifted) or not given_points(block).any():

@@ -15,7 +15,7 @@ import numpy as np
 from photogram.adjustment.exchanged_names import exchanged_names
 from photogram.adjustment.first_values import first_values
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.diagnosis.regression import view
+from photogram.diagnosis.predictions import view
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
 from photogram.network.subset import kept_images, of_photos

@@ -41,15 +41,15 @@ REGISTRY = (
     Mistake("control-set", "set", "control_sets.wrong_control", of="control-misfit"),
     Mistake("convention", "data", "conventions.hints"),
     Mistake("trajectory", "data", "trajectory_hints.flown_hints"),
-    Mistake("readout", "misfit", "shutters.readout_hints"),
-    Mistake("backward-readout", "fit", "shutters.backward_readouts"),
-    Mistake("clock", "fit", "clocks.known_offsets"),
-    Mistake("seam", "fit", "film_scans.seam_hints"),
+    Mistake("readout", "misfit", "moving.readout_hints"),
+    Mistake("backward-readout", "fit", "moving.backward_readouts"),
+    Mistake("clock", "fit", "moving.known_offsets"),
+    Mistake("seam", "fit", "films.seam_hints"),
     # A film in two pieces, or one that has changed along one axis, also makes marks fail.
-    Mistake("axis", "fit", "film_marks.axis_hints", unless=("seam",)),
-    Mistake("marks", "fit", "film_marks.mark_hints", unless=("seam", "axis")),
+    Mistake("axis", "fit", "films.axis_hints", unless=("seam",)),
+    Mistake("marks", "fit", "films.mark_hints", unless=("seam", "axis")),
     Mistake("certificate", "fit", "lenses.certificate_hints"),
-    Mistake("jitter", "fit", "film_scans.line_hints"),
+    Mistake("jitter", "fit", "films.line_hints"),
 )
 
 

@@ -3,7 +3,7 @@
 Observations are predicted from given tables, points and cameras. The misfit of observed positions is their
 difference from the trajectory at their time, relative to their spread.
 
-    m = rms(observed - predicted) / rms(observed - mean)          (:mod:`photogram.diagnosis.regression`)
+    m = rms(observed - predicted) / rms(observed - mean)          (:mod:`photogram.diagnosis.predictions`)
 
 Samples and lines of scanners are image coordinates as well. A wrong time or attitude of their trajectory
 shifts them by many lines.
@@ -19,12 +19,19 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.clocks import shifts
 from photogram.diagnosis.hypotheses import quaternion_readings
 from photogram.diagnosis.mistakes import Change, Proposal
+from photogram.diagnosis.moving import shifts
 from photogram.diagnosis.positions import arm_of
-from photogram.diagnosis.predictions import Predicted, predict
-from photogram.diagnosis.regression import MOST, UNKNOWN, eligible, given_points, relative
+from photogram.diagnosis.predictions import (
+    MOST,
+    UNKNOWN,
+    Predicted,
+    eligible,
+    given_points,
+    predict,
+    relative,
+)
 from photogram.errors import InputError
 from photogram.messages import Message
 from photogram.network.block import Block

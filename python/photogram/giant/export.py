@@ -13,11 +13,17 @@ from photogram.arguments.arrays import natural_order, rows_of_each
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.giant.common import Common
+from photogram.giant.contents import (
+    CHECK_POINT,
+    Camera,
+    Frame,
+    GroundPoint,
+    ImageFrame,
+    frame_records,
+    ground_records,
+)
 from photogram.giant.fields import printed_order
 from photogram.giant.files import written
-from photogram.giant.frames import Camera, Frame, frame_records
-from photogram.giant.ground import CHECK_POINT, GroundPoint, ground_records
-from photogram.giant.images import ImageFrame
 from photogram.messages import Message
 from photogram.network.block import Block, checked, of_images_alone
 from photogram.network.refraction import Refraction, metres_per_unit

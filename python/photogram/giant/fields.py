@@ -91,14 +91,6 @@ def _rounded(value: float, width: int) -> str:
     return text
 
 
-def pack_dms(arcseconds: Decimal) -> str:
-    """Write seconds of arc as DDDMMSS.sss without leading zeros."""
-    whole_minutes, seconds = divmod(abs(arcseconds), 60)
-    degrees, minutes = divmod(int(whole_minutes), 60)
-    packed = 10000 * degrees + 100 * minutes + seconds
-    return f"{'-' if arcseconds < 0 else ''}{packed:f}"
-
-
 def format_angle(value: float, width: int) -> str:
     """Write radians as a packed DMS field with an explicit point, right-justified.
 
@@ -124,7 +116,11 @@ def _packed(value: float, width: int, *, least: int, most: int = 12) -> str:
     places, excess = min(most, width - 2) + 1, 1
     while excess > 0 and places > 0:
         places = max(0, places - excess)
-        whole, _, fraction = pack_dms(round(arcseconds, places)).partition(".")
+        rounded = round(arcseconds, places)
+        whole_minutes, seconds = divmod(abs(rounded), 60)
+        degrees, minutes = divmod(int(whole_minutes), 60)
+        packed = f"{'-' if rounded < 0 else ''}{10000 * degrees + 100 * minutes + seconds:f}"
+        whole, _, fraction = packed.partition(".")
         excess = len(whole) + 1 + places - width
     if excess > 0:
         raise ValueError(phrase("giant.width", value=f"{value} rad", width=width))

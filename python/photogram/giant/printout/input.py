@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from photogram.giant.common import Common
-from photogram.giant.diagnostics import ErrorWarning
-from photogram.giant.ground import GroundPoint
-from photogram.giant.images import IMAGE_SD, ImageFrame
+from photogram.giant.contents import IMAGE_SD, GroundPoint, ImageFrame
+from photogram.giant.limits import ErrorWarning
 from photogram.giant.printout.forms import (
     Page,
     Space,
@@ -19,7 +18,6 @@ from photogram.giant.printout.forms import (
     headed,
     paginate,
 )
-from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
 
 UNIT_VARIANCE: dict[str, str] = {
@@ -99,53 +97,47 @@ def control_pages(
 ACROSS = 4  # Plate coordinates, or names of points, per line
 
 
-@dataclass(frozen=True)
-class Station:
-    """Input of a camera station in block units, with standard deviations."""
-
-    position: Values
-    attitude: Values
-    position_sd: Values
-    attitude_sd: Values
-    principal_distance: float
-
-
 def frame_pages(
     space: Space,
     photo_to_ground: bool,
-    station: Station,
+    pose: Sequence[Values],
+    principal_distance: float,
     images: ImageFrame,
     *,
     parameters: bool = True,
     plates: bool = True,
 ) -> list[Page]:
-    """Return the requested pages of a frame: station, plate coordinates."""
+    """Return the requested pages of a frame: station, plate coordinates.
+
+    The pose is position and attitude in block units, then their standard deviations.
+    """
     x_sd, y_sd = (sd or IMAGE_SD for sd in images.sd)
     frame = ["", f"FRAME  {images.name}", ""]
     heading = [
         *frame,
-        f"PRINCIPAL DISTANCE ={fixed(station.principal_distance, 12, 4)}"
+        f"PRINCIPAL DISTANCE ={fixed(principal_distance, 12, 4)}"
         f"     ST. D. OF X ={fixed(x_sd, 10, 4)}     ST. D. OF Y ={fixed(y_sd, 10, 4)}",
         "",
     ]
     if parameters:
-        heading += _parameters(space, photo_to_ground, station)
+        heading += _parameters(space, photo_to_ground, pose)
     columns = headed("PLATE COORDINATES", f"{'ID':<8}{'X':>10}{'Y':>11}    " * ACROSS)[1:] if plates else []
     return paginate([*heading, *columns], _plates(images) if plates else [], again=[*frame, *columns])
 
 
-def _parameters(space: Space, photo_to_ground: bool, station: Station) -> Page:
+def _parameters(space: Space, photo_to_ground: bool, pose: Sequence[Values]) -> Page:
+    position, angles, position_sd, angles_sd = pose
     sense = attitude_name(photo_to_ground)
     lines = headed(
         "CAMERA STATION PARAMETERS", f"{'P O S I T I O N':^49}{f'A T T I T U D E  ({sense})':^49}".rstrip()
     )[1:]
     rows = zip(
         space.names,
-        space.values(station.position, 4),
-        space.values(station.position_sd, 4),
+        space.values(position, 4),
+        space.values(position_sd, 4),
         ("OMEGA", "PHI", "KAPPA"),
-        attitude(station.attitude),
-        (dms(each) for each in station.attitude_sd),
+        attitude(angles),
+        (dms(each) for each in angles_sd),
         strict=True,
     )
     for name, value, sd, angle, turn, turn_sd in rows:

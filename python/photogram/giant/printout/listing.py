@@ -9,17 +9,19 @@ import numpy as np
 
 from photogram.arguments.arrays import rows_of_each, truth_value
 from photogram.arguments.types import Bools
-from photogram.giant.diagnostics import error_warnings
 from photogram.giant.fields import printed_order
-from photogram.giant.limits import Limits
+from photogram.giant.limits import Limits, error_warnings
 from photogram.giant.printout.forms import Page, Space, printout
-from photogram.giant.printout.input import Station, control_pages, frame_pages, options_page, warning_pages
-from photogram.giant.printout.iterations import PointResiduals, iteration_pages, residual_pages, statistics
+from photogram.giant.printout.input import control_pages, frame_pages, options_page, warning_pages
 from photogram.giant.printout.results import (
+    Residuals,
     correction_pages,
+    iteration_pages,
     point_pages,
     propagated_point_pages,
+    residual_pages,
     station_pages,
+    statistics,
 )
 from photogram.network.block import Block
 from photogram.results.result import Result
@@ -92,18 +94,13 @@ def _input_pages(project: Project, block: Block, space: Space) -> Iterator[Page]
     if common.list_input_stations or common.list_input_images:
         images = {frame.name: frame for frame in reversed(project.images)}
         distances = block.known_distances("GIANT files")
+        poses = block.photo_positions, block.photo_attitudes, block.photo_position_sd, block.photo_attitude_sd
         for row, name in enumerate(block.photo_ids):
-            station = Station(
-                block.photo_positions[row],
-                block.photo_attitudes[row],
-                block.photo_position_sd[row],
-                block.photo_attitude_sd[row],
-                distances[row],
-            )
             yield from frame_pages(
                 space,
                 block.photo_to_ground,
-                station,
+                [each[row] for each in poses],
+                distances[row],
                 images[name],
                 parameters=common.list_input_stations,
                 plates=common.list_input_images,
@@ -143,13 +140,13 @@ def _result_pages(
     yield from _corrections(project, block, result, space, as_published)
 
 
-def _residuals(block: Block, result: Result) -> Iterator[PointResiduals]:
+def _residuals(block: Block, result: Result) -> Iterator[Residuals]:
     """Yield the points in order of the block, with images by frame."""
     images = rows_of_each(block.image_points, len(block.point_ids))
     for point in np.flatnonzero(result.used_points).tolist():
         rows = images[point]
         frames = [block.photo_ids[photo] for photo in block.image_photos[rows].tolist()]
-        yield PointResiduals(block.point_ids[point], frames, result.residuals[rows])
+        yield block.point_ids[point], frames, result.residuals[rows]
 
 
 def _points(project: Project, block: Block, result: Result, space: Space, propagated: bool) -> list[Page]:
