@@ -17,7 +17,7 @@ import pytest
 from photogram import AsPublished, Block, Refraction, Result, adjust, simulate
 from photogram.giant import Common, ErrorWarning, GroundPoint, ImageFrame, Project, listing, read_project
 from photogram.giant.printout.forms import Space, attitude, dms, exponential, fixed, paginate
-from photogram.giant.printout.input import control_pages, frame_pages, options_page, warning_pages
+from photogram.giant.printout.listing import control_pages, frame_pages, options_page, warning_pages
 from photogram.giant.printout.results import (
     correction_pages,
     iteration_pages,

@@ -19,7 +19,7 @@ from photogram import Iteration
 from photogram.giant import Common, ErrorWarning, GroundPoint, ImageFrame
 from photogram.giant.fields import printed_order
 from photogram.giant.printout.forms import Space, matrix_rows, printout
-from photogram.giant.printout.input import control_pages, frame_pages, options_page, warning_pages
+from photogram.giant.printout.listing import control_pages, frame_pages, options_page, warning_pages
 from photogram.giant.printout.results import (
     correction_pages,
     iteration_pages,

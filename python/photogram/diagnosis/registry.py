@@ -37,8 +37,8 @@ class Mistake:
 
 REGISTRY = (
     Mistake("lens", "lens", "lenses.wrong_terms"),
-    Mistake("observed-positions", "set", "positions.wrong_positions"),
-    Mistake("control-set", "set", "control_sets.wrong_control", of="control-misfit"),
+    Mistake("observed-positions", "set", "sets.wrong_positions"),
+    Mistake("control-set", "set", "sets.wrong_control", of="control-misfit"),
     Mistake("convention", "data", "conventions.hints"),
     Mistake("trajectory", "data", "trajectory_hints.flown_hints"),
     Mistake("readout", "misfit", "moving.readout_hints"),

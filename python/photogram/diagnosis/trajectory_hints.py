@@ -19,10 +19,9 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.hypotheses import quaternion_readings
+from photogram.diagnosis.conventions import quaternion_readings
 from photogram.diagnosis.mistakes import Change, Proposal
 from photogram.diagnosis.moving import shifts
-from photogram.diagnosis.positions import arm_of
 from photogram.diagnosis.predictions import (
     MOST,
     UNKNOWN,
@@ -32,6 +31,7 @@ from photogram.diagnosis.predictions import (
     predict,
     relative,
 )
+from photogram.diagnosis.sets import arm_of
 from photogram.errors import InputError
 from photogram.messages import Message
 from photogram.network.block import Block

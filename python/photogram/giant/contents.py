@@ -8,15 +8,16 @@ from collections.abc import Iterable
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.giant.columns import (
+from photogram.giant.fields import (
     Columns,
     angle_fields,
     deviation_fields,
+    format_name,
+    format_principal_distance,
     position_fields,
     real_fields,
     texts,
 )
-from photogram.giant.fields import format_name, format_principal_distance
 from photogram.giant.records import Record, Source
 from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import dataclass, field
