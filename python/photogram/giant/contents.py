@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -95,16 +96,21 @@ class Frame:
     record: Record | None = field(default=None, compare=False, repr=False)
 
 
+def _position(fields: Any, geographic: bool) -> tuple[Any, Any]:
+    """Read position and standard deviations of a record, or of columns of records."""
+    return fields.position(geographic), fields.deviations(geographic, geographic, False)
+
+
+def _attitude(fields: Any) -> tuple[Any, Any]:
+    return fields.attitude(), fields.deviations(True, True, True)
+
+
 def parse_frames(source: Source, geographic: bool) -> list[Frame]:
     """Read FRAMES in their order, which structures the normal equations."""
     records = source.records()
-    positions = Columns([record.text for record in records[::2]])
-    attitudes = Columns([record.text for record in records[1::2]])
-    plain = zip(
-        positions.rows(positions.position(geographic), positions.deviations(geographic, geographic, False)),
-        [*attitudes.rows(attitudes.attitude(), attitudes.deviations(True, True, True)), None],
-        strict=False,
-    )
+    positions, attitudes = (Columns([record.text for record in records[first::2]]) for first in (0, 1))
+    plain_attitudes = [*attitudes.rows(*_attitude(attitudes)), None]
+    plain = zip(positions.rows(*_position(positions, geographic)), plain_attitudes, strict=False)
     frames: list[Frame] = []
     spellings: dict[str, Record] = {}
     pairs = zip(records[::2], [*records[1::2], None], plain, strict=False)
@@ -118,14 +124,8 @@ def parse_frames(source: Source, geographic: bool) -> list[Frame]:
         if attitude is None or attitude.identification(spellings) != name:
             where = position if attitude is None else attitude
             raise where.error(phrase("giant.attitude-record", frame=name))
-        station, station_sd = plain_position or (
-            position.position(geographic),
-            position.deviations(geographic, geographic, False),
-        )
-        angles, angles_sd = plain_attitude or (
-            attitude.attitude(),
-            attitude.deviations(True, True, True),
-        )
+        station, station_sd = plain_position or _position(position, geographic)
+        angles, angles_sd = plain_attitude or _attitude(attitude)
         frames.append(Frame(name, station, angles, station_sd, angles_sd, position))
     return frames
 
@@ -314,18 +314,10 @@ def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
     records = source.records()
     names = source.point_names([record.number for record in records])
     columns = Columns([record.text for record in records])
-    plain = columns.rows(
-        columns.position(geographic),
-        columns.deviations(geographic, geographic, False),
-        columns.real(80, 80, 0)[:, np.newaxis],
-    )
+    plain = columns.rows(*_position(columns, geographic), columns.real(80, 80, 0)[:, np.newaxis])
     points: dict[str, GroundPoint] = {}
     for record, name, values in zip(records, names, plain, strict=True):
-        position, sd, (type_code,) = values or (
-            record.position(geographic),
-            record.deviations(geographic, geographic, False),
-            (record.integer(80, 80),),
-        )
+        position, sd, (type_code,) = values or (*_position(record, geographic), (record.integer(80, 80),))
         point = GroundPoint(name, position, sd, int(type_code), record)
         if point.type_code > CHECK_POINT:
             raise record.error(phrase("giant.digit", column=80, largest=7, value=point.type_code))
