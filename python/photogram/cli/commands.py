@@ -59,7 +59,6 @@ COMMANDS: dict[str, str | dict[str, str]] = {
 
 
 def application(word: str | None = None) -> typer.Typer:
-    """Return the command line."""
     made = typer.Typer(
         name="photogram",
         cls=Group,

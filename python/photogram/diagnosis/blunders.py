@@ -160,15 +160,11 @@ def _remove(
     if found.exchanged:
         return [*found.exchanged]
     edited.first, edited.last = edited.first or found.result, found.result
-    misfits = Misfits(block, suspected, found, found.result)
-    edited.section.findings += misfits.in_section
-    edited.gross += misfits.of_suspects
-    edited.control = misfits.control
+    Misfits(block, suspected, found, found.result, edited).add()
     return []
 
 
 def _with_names(block: Block, exchanges: list[Exchange]) -> Block:
-    """Return a block with exchanged names of points."""
     points = block.image_points.copy()
     for each in exchanges:
         on = block.image_photos == block.photo_ids.index(each.photos[0])
@@ -194,32 +190,34 @@ AS_WELL = 3.0  # Least ratio of the remaining residual without one ray to that o
 
 
 class Misfits:
-    """Findings on a block of which (m,) images of undetermined points were excluded before data snooping."""
+    """Findings on a block of which (m,) images of undetermined points were excluded before snooping."""
 
-    def __init__(self, block: Block, suspected: Bools, found: Snooped, result: Result) -> None:
+    def __init__(
+        self, block: Block, suspected: Bools, found: Snooped, result: Result, edited: Edited
+    ) -> None:
         assert isinstance(found.suspects, BlockSuspects)
         self.block, self.suspected, self.suspects = block, suspected, found.suspects
-        self.found, self.result = found, result
+        self.found, self.result, self.edited = found, result, edited
         values = sizes_of_tests(result)["image"]
         values = values[values > 0]
         # If errors have heavier tails than normal ones, the 95 % quantile (1.96 sd) defines the spread.
         self.tail = max(1.0, float(np.quantile(values, 0.95)) / TWENTIETH) if values.size else 1.0
 
-        self.in_section: list[Finding] = []  # on observations of the adjustment
-        self.of_suspects: list[Finding] = []  # on photos, names, and images of undetermined points
-        self.control: dict[str, list[Finding]] = {}  # on components of control, by point
+    def add(self) -> None:
+        """Add the findings to the lists of the adjustment."""
         # Errors against the others are exact, also if they are large.
         entries = [
             replace(entry, error=entry.prediction_error or entry.error)
-            for entry in found.log
+            for entry in self.found.log
             if entry.returned is None
         ]
-        explained = set() if flown_by(block) else self._parted(entries)
+        explained = set() if flown_by(self.block) else self._parted(entries)
         for entry in entries:
             if self._image_of(entry) not in explained:
                 self._add(entry)
-        common = [each.fields for each in found.outcome.remarks if each.code == "snooping.common"]
-        self.in_section += [finding("grave", phrase("check.common-error", **each)) for each in common]
+        for each in self.found.outcome.remarks:
+            if each.code == "snooping.common":
+                self.edited.section.note("grave", "check.common-error", **each.fields)
 
     def _image_of(self, entry: Removal) -> int:
         """Return the number of an image; -1 for other observations."""
@@ -232,14 +230,14 @@ class Misfits:
             photo = int(self.suspects.photos[entry.group])
             name, count = self.block.photo_ids[photo], int((self.block.image_photos == photo).sum())
             message = phrase("check.bad-photo.points", photo=name, n=count)
-            self.of_suspects.append(finding("grave", message, [name], values={"points": float(count)}))
+            self.edited.gross.append(finding("grave", message, [name], values={"points": float(count)}))
         elif kind == CONTROL:
             point = self.block.point_ids[self.suspects.points[entry.group]]
-            self.control.setdefault(point, []).extend(self._errors(entry))
+            self.edited.control.setdefault(point, []).extend(self._errors(entry))
         elif kind == IMAGE and self.suspected[self._image_of(entry)]:
-            self.of_suspects += self._errors(entry)
+            self.edited.gross += self._errors(entry)
         else:
-            self.in_section += self._errors(entry)
+            self.edited.section.findings += self._errors(entry)
 
     def _parted(self, entries: list[Removal]) -> set[int]:
         """Add names of two points, the rays of which intersect in two groups; return their images."""
@@ -266,7 +264,7 @@ class Misfits:
                 fields = {"point": name, "first": first, "second": second, "before": before, "unit": unit}
                 message = phrase("check.name-used-twice", **fields)
                 found = finding("grave", message, [*first, *second], [name], {f"residual_{unit}": before})
-                self.of_suspects.append(found)
+                self.edited.gross.append(found)
                 explained |= {*rows.tolist()}
         return explained
 

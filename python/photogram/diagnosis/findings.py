@@ -132,7 +132,6 @@ def finding(
 
 
 def note_all(section: Section, kind: str, level: Level, messages: Sequence[Message | Phrase | str]) -> None:
-    """Add a finding for each message."""
     for each in messages:
         own = each if isinstance(each, Phrase) else getattr(each, "phrase", None)
         section.findings.append(Finding(kind, level, str(each), phrase=own))

@@ -30,7 +30,6 @@ class Mistake:
     of: str = "residuals"  # that it explains
 
     def __call__(self, *given: Any) -> Any:
-        """Search for the mistake."""
         module, name = self.search.split(".")
         return getattr(import_module(f"photogram.diagnosis.{module}"), name)(*given)
 
@@ -54,12 +53,10 @@ REGISTRY = (
 
 
 def at(stage: Stage) -> tuple[Mistake, ...]:
-    """Return the mistakes of a stage."""
     return tuple(each for each in REGISTRY if each.stage == stage)
 
 
 def hints_at(stage: Stage, *given: Any) -> list[Message]:
-    """Return the messages on all mistakes of a stage."""
     found: dict[str, list[Message]] = {}
     for each in at(stage):
         if not any(found.get(kind) for kind in each.unless):

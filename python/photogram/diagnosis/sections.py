@@ -168,7 +168,6 @@ VARIANCE = (0.5, 2.0)  # Variance of unit weight of realistic standard deviation
 
 
 def key_numbers(edited: Edited, words: Words) -> Section:
-    """Return the section of key numbers."""
     section = section_of("key-numbers")
     first, last = edited.first, edited.last
     if first is None or last is None:

@@ -66,7 +66,10 @@ def wrong_control(block: Block, adjusted: Adjuster) -> Explained | None:
     """Return the mistake in the control as a set, or in two points, that explains the misfit, if any."""
     if not np.isfinite(block.point_sd).any() or not doubtful(adjusted.tried(block), "control"):
         return None
-    proposals = [*_of_sets(block), *_of_pairs(block)]
+    kinds = SETS if block.spheroid is None else OF_GEOGRAPHIC
+    changes = {kind: partial(intended, kind=kind) for kind in kinds}
+    of_sets = [Proposal(kind, phrase(f"mistake.control.{kind}"), each) for kind, each in changes.items()]
+    proposals = [*of_sets, *_of_pairs(block)]
     found = explain(block, proposals, adjusted, partial(_some_wrong, adjusted=adjusted))
     if found is None or found.best[0].points:
         return found if found is not None and found.is_certain else None
@@ -78,11 +81,6 @@ def wrong_control(block: Block, adjusted: Adjuster) -> Explained | None:
         # A mistake in the set cannot be distinguished from one in some points.
         found = replace(found, judged=replace(found.judged, explained=False))
     return found
-
-
-def _of_sets(block: Block) -> Iterator[Proposal]:
-    for kind in SETS if block.spheroid is None else OF_GEOGRAPHIC:
-        yield Proposal(kind, phrase(f"mistake.control.{kind}"), partial(intended, kind=kind))
 
 
 def intended(block: Block, kind: str) -> Block:

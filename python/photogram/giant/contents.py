@@ -47,7 +47,6 @@ class Camera:
 
 
 def parse_cameras(source: Source) -> list[Camera]:
-    """Read CAMERAS."""
     cameras: list[Camera] = []
     spellings: dict[str, Record] = {}
     for record in source.records():
@@ -63,7 +62,6 @@ def parse_cameras(source: Source) -> list[Camera]:
 
 
 def camera_records(cameras: Iterable[Camera]) -> list[str]:
-    """Write CAMERAS."""
     return [
         f"{format_name(camera.name)}  {format_principal_distance(camera.principal_distance)}"
         for camera in cameras
@@ -131,7 +129,6 @@ def parse_frames(source: Source, geographic: bool) -> list[Frame]:
 
 
 def frame_records(frames: Iterable[Frame], geographic: bool) -> list[str]:
-    """Write FRAMES."""
     frames = list(frames)
     rows = zip(
         frames,
@@ -255,7 +252,6 @@ def _coordinates(source: Source, numbers: list[int]) -> Floats:
 
 
 def image_records(frames: Iterable[ImageFrame]) -> list[str]:
-    """Write IMAGES."""
     frames = list(frames)
     xy = texts(real_fields(np.concatenate([np.empty((0, 2)), *(frame.xy for frame in frames)]), 10, 3))
     distances = {value: format_principal_distance(value) for value in {f.principal_distance for f in frames}}
@@ -333,7 +329,6 @@ def parse_ground(source: Source, geographic: bool) -> list[GroundPoint]:
 
 
 def ground_records(points: Iterable[GroundPoint], geographic: bool) -> list[str]:
-    """Write GROUND."""
     points = list(points)
     rows = zip(
         points,
