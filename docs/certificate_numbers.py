@@ -9,8 +9,7 @@ from textwrap import wrap
 
 from photogram.film import Certificate, compare_cameras
 from photogram.film.years import simulated_certificates
-from photogram.show.cells import written
-from photogram.show.forms import table_text
+from photogram.show.forms import table_text, written
 
 EXAMPLE = files("photogram") / "examples" / "certificate" / "rc10.toml"
 

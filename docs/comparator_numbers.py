@@ -13,8 +13,7 @@ from photogram import comparator
 from photogram.comparator.fits import fit_rigid
 from photogram.comparator.listing import combined_linear_page, variance_lines
 from photogram.comparator.simulation import simulated_years
-from photogram.show.cells import written
-from photogram.show.forms import part_lines, table_text
+from photogram.show.forms import part_lines, table_text, written
 
 
 @cache

@@ -8,8 +8,7 @@ import textwrap
 import numpy as np
 
 from photogram import Block, adjust, simulate
-from photogram.show.cells import written
-from photogram.show.forms import table_text
+from photogram.show.forms import table_text, written
 from photogram.show.judgement import verdict_table
 from photogram.statistics import (
     b_method,

@@ -7,8 +7,7 @@ import re
 from collections.abc import Iterable, Iterator
 
 from photogram.show import quantity
-from photogram.show.cells import written
-from photogram.show.forms import PLAIN
+from photogram.show.forms import PLAIN, written
 from photogram.show.page import Document, Facts, Layers, Part, Remarks, Table, Text
 from photogram.statistics.verdict import Verdict
 

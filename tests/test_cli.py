@@ -15,8 +15,8 @@ from rich.markup import render
 import photogram
 from photogram.cli import app
 from photogram.cli.commands import application
-from photogram.cli.simulate import OfPython
-from photogram.cli.simulate import simulate as simulate_command
+from photogram.cli.plan import OfPython
+from photogram.cli.plan import simulate as simulate_command
 from photogram.giant import read_project
 from photogram.network import SimulationOptions
 from photogram.words import Phrase

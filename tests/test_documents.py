@@ -14,8 +14,7 @@ import pytest
 import photogram
 from photogram.io import json as json_files
 from photogram.show import html, quantity
-from photogram.show.cells import written
-from photogram.show.forms import record, table_text, text, titled_lines, to_json
+from photogram.show.forms import record, table_text, text, titled_lines, to_json, written
 from photogram.show.methods import Documented
 from photogram.show.page import (
     Column,

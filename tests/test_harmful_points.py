@@ -10,7 +10,7 @@ import pytest
 
 from message_codes import has_code
 from photogram import Block, adjust, diagnose, simulate, snoop
-from photogram.diagnosis.key_numbers import held_values
+from photogram.diagnosis.sections import held_values
 from photogram.network import project
 from photogram.results import network_sections
 from photogram.words import Phrase, phrase

@@ -33,7 +33,7 @@ from photogram import (
 )
 from photogram.adjustment.prediction import at_adjusted
 from photogram.cli.plan import plan as plan_command
-from photogram.cli.simulate import simulate as simulate_command
+from photogram.cli.plan import simulate as simulate_command
 from photogram.planning import Pattern
 from photogram.planning.networks import advice
 from photogram.planning.pattern import locations

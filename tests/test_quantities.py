@@ -13,8 +13,7 @@ from photogram.formats.results import excel_file, table_files
 from photogram.io import json
 from photogram.results.statement.texts import Texts
 from photogram.results.tables import TABLES
-from photogram.show.cells import written
-from photogram.show.forms import fact_lines, record, text, titled_lines
+from photogram.show.forms import fact_lines, record, text, titled_lines, written
 from photogram.show.html import page_html
 from photogram.show.page import Document, Fact, Layers, Section, probability_written
 from photogram.show.quantity import (

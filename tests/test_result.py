@@ -13,8 +13,7 @@ import pytest
 
 from photogram import Attitudes, Block, Result, Spheroid, adjust, simulate
 from photogram.network import lengths_of_units, project
-from photogram.show.cells import written
-from photogram.show.forms import titled_lines
+from photogram.show.forms import titled_lines, written
 from photogram.words import Phrase
 
 ARCSEC = 180 * 3600 / math.pi

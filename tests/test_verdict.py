@@ -11,8 +11,7 @@ import pytest
 from contradictions import contradictions, sentences_of
 from photogram import adjust, resect, simulate
 from photogram.network import project
-from photogram.show.cells import written
-from photogram.show.forms import table_text
+from photogram.show.forms import table_text, written
 from photogram.show.forms import text as report_of
 from photogram.show.judgement import judged, verdict_table
 from photogram.show.page import Document

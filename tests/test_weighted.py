@@ -12,7 +12,7 @@ import pytest
 from message_codes import raises
 from photogram import Block, InputError, Result, Spheroid, adjust, predict, simulate
 from photogram.giant import Project, read_project
-from photogram.show.cells import written
+from photogram.show.forms import written
 from photogram.statistics import global_test
 
 SPACES: dict[str, dict[str, Any]] = {

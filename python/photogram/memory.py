@@ -12,17 +12,12 @@ from pathlib import Path
 from photogram.errors import OutOfMemoryError
 from photogram.words import phrase
 
-GROUPS = (
-    # Control groups version 2, without and with version 1; then version 1.
-    ("", "sys/fs/cgroup", "memory.max", "memory.current", "inactive_file"),
-    ("", "sys/fs/cgroup/unified", "memory.max", "memory.current", "inactive_file"),
-    (
-        "memory",
-        "sys/fs/cgroup/memory",
-        "memory.limit_in_bytes",
-        "memory.usage_in_bytes",
-        "total_inactive_file",
-    ),
+VERSION_1 = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
+VERSION_2 = ("memory.max", "memory.current", "inactive_file")
+GROUPS = (  # Control groups version 2, without and with version 1; then version 1
+    ("", "sys/fs/cgroup", *VERSION_2),
+    ("", "sys/fs/cgroup/unified", *VERSION_2),
+    ("memory", "sys/fs/cgroup/memory", *VERSION_1),
 )
 """Controller, root of its group tree, files with limit and usage, and key of the reclaimable memory."""
 STACK = 160 << 20  # Bytes of addresses for the stack of a thread, its share of the heap and a reserve

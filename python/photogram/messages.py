@@ -18,11 +18,6 @@ MANY = 2_000  # Number of names above which no nearest name is searched
 MOST_CHARACTERS = 200  # Maximum number of characters of a record in a message
 
 
-def shortened(text: str, most: int = MOST_CHARACTERS) -> str:
-    """Shorten a long text to its beginning and its length; return a short text unchanged."""
-    return text if len(text) <= most else f"{text[:most]}... ({len(text)} characters)"
-
-
 def locate(message: str, file: Path | None, record: int | None, text: str | None) -> str:
     """Add the location (file, record number and record text) to a message.
 
@@ -34,7 +29,8 @@ def locate(message: str, file: Path | None, record: int | None, text: str | None
     head = f"{place}: {message}" if place else message
     if text is None:
         return head
-    return f"{head}\n    |{printable(shortened(text))}|"
+    rest = "" if len(text) <= MOST_CHARACTERS else f"... ({len(text)} characters)"
+    return f"{head}\n    |{printable(text[:MOST_CHARACTERS])}{rest}|"
 
 
 def printable(text: str) -> str:

@@ -7,7 +7,7 @@ import pytest
 
 from golden_data import golden as golden_file
 from photogram import orient
-from photogram.absolute_orientation import Stations, hints
+from photogram.absolute_orientation import Stations, adjust
 from photogram.statistics.likelihood import judged, likelihood
 
 CASES = (
@@ -52,8 +52,8 @@ def tried(given, monkeypatch):
         seen.append(trials(*arguments))
         return seen[-1]
 
-    trials = hints.trials
-    monkeypatch.setattr(hints, "trials", kept)
+    trials = adjust.trials
+    monkeypatch.setattr(adjust, "trials", kept)
     monkeypatch.setattr("photogram.absolute_orientation.adjust.SUSPICIOUS", 0.0)
     return orient(given), seen
 

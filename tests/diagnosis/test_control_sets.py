@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from photogram import diagnose, simulate
-from photogram.diagnosis.control_sets import doubtful, wrong_control
 from photogram.diagnosis.mistakes import Adjuster
+from photogram.diagnosis.sets import doubtful, wrong_control
 
 BLOCK = simulate(
     strips=3, photos_per_strip=6, points_per_photo=40, control_spacing=2, control_sd=0.05, seed=11

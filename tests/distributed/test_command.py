@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import photogram
 from photogram import adjust, adjust_in_parts, read_result
 from photogram.cli import app
-from photogram.cli.in_parts import TAKEN
+from photogram.cli.adjust import TAKEN
 from photogram.cli.options import option_name
 from photogram.distributed import Division
 from photogram.formats import ReadOptions, read

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from photogram import InputError, Result, adjust
 from photogram.cli import app
 from photogram.diagnosis.after_adjustment import diagnosed
-from photogram.diagnosis.film_scans import seam_hints
+from photogram.diagnosis.films import seam_hints
 from photogram.formats import read
 from photogram.results.film_report import film_table
 

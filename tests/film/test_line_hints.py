@@ -7,7 +7,7 @@ from example_scripts import load
 from photogram import Block, adjust
 from photogram.arguments.types import Floats
 from photogram.diagnosis.after_adjustment import diagnosed
-from photogram.diagnosis.film_scans import line_hints
+from photogram.diagnosis.films import line_hints
 from photogram.formats import read
 
 

@@ -11,8 +11,7 @@ from golden_data import golden
 from message_codes import coded
 from photogram import InputError, Result, adjust
 from photogram.diagnosis.after_adjustment import diagnosed
-from photogram.diagnosis.film_marks import mark_hints
-from photogram.diagnosis.film_scans import seam_hints
+from photogram.diagnosis.films import mark_hints, seam_hints
 from photogram.film import compare_steps
 from photogram.formats import read
 from test_film import project

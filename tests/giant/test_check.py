@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from message_codes import nested_codes
 from photogram import Spheroid, diagnose, simulate
 from photogram.cli import app
-from photogram.diagnosis.control_sets import exchange
-from photogram.diagnosis.hypotheses import KAPPA, TURNS
-from photogram.diagnosis.structure import parts_of
+from photogram.diagnosis.conventions import KAPPA, TURNS
+from photogram.diagnosis.sections import parts_of
+from photogram.diagnosis.sets import exchange
 from photogram.giant import Limits, Project, write_project
 from photogram.giant.checking import check
 from photogram.network.rays import Rays

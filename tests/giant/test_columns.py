@@ -10,8 +10,15 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from photogram import InputError
-from photogram.giant.columns import Columns, angle_fields, position_fields, real_fields, texts
-from photogram.giant.fields import format_angle, format_real
+from photogram.giant.fields import (
+    Columns,
+    angle_fields,
+    format_angle,
+    format_real,
+    position_fields,
+    real_fields,
+    texts,
+)
 from photogram.giant.records import Source
 from photogram.stellar import ARCSEC
 

@@ -12,10 +12,15 @@ from small_project import write_files
 from photogram import InputError
 from photogram.giant import Camera, Common, ImageFrame, Project, read_project
 from photogram.giant.common import common_records, parse_common
+from photogram.giant.contents import (
+    frame_records,
+    ground_records,
+    parse_cameras,
+    parse_frames,
+    parse_ground,
+    parse_images,
+)
 from photogram.giant.fields import parse_angle, parse_name, unpack_dms
-from photogram.giant.frames import frame_records, parse_cameras, parse_frames
-from photogram.giant.ground import ground_records, parse_ground
-from photogram.giant.images import parse_images
 from photogram.giant.records import Source
 
 ARCSEC = math.radians(1 / 3600)

@@ -11,9 +11,16 @@ from small_project import FRAMES, GROUND, IMAGES, ground_record, replaced
 from photogram import InputError
 from photogram.giant import Common
 from photogram.giant.common import common_records, parse_common
-from photogram.giant.frames import camera_records, frame_records, parse_cameras, parse_frames
-from photogram.giant.ground import ground_records, parse_ground
-from photogram.giant.images import image_records, parse_images
+from photogram.giant.contents import (
+    camera_records,
+    frame_records,
+    ground_records,
+    image_records,
+    parse_cameras,
+    parse_frames,
+    parse_ground,
+    parse_images,
+)
 from photogram.giant.records import Source
 
 SAMPLE = json.loads((Path(__file__).parents[1] / "data" / "giant" / "sample_records.json").read_text())

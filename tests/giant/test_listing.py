@@ -17,9 +17,15 @@ import pytest
 from photogram import AsPublished, Block, Refraction, Result, adjust, simulate
 from photogram.giant import Common, ErrorWarning, GroundPoint, ImageFrame, Project, listing, read_project
 from photogram.giant.printout.forms import Space, attitude, dms, exponential, fixed, paginate
-from photogram.giant.printout.input import Station, control_pages, frame_pages, options_page, warning_pages
-from photogram.giant.printout.iterations import PointResiduals, iteration_pages, residual_pages, statistics
-from photogram.giant.printout.results import correction_pages, propagated_point_pages, station_pages
+from photogram.giant.printout.listing import control_pages, frame_pages, options_page, warning_pages
+from photogram.giant.printout.results import (
+    correction_pages,
+    iteration_pages,
+    propagated_point_pages,
+    residual_pages,
+    station_pages,
+    statistics,
+)
 
 DATA = Path(__file__).parents[1] / "data" / "giant"
 SNAPSHOT = DATA / "listing_galveston.txt"
@@ -204,8 +210,8 @@ def plain_frame(points, **switches):
     frame = ImageFrame(
         "F", [f"P{number}" for number in range(points)], np.zeros((points, 2)), sd=(0.006, 0.0)
     )
-    station = Station(np.zeros(3), np.zeros(3), np.ones(3), np.ones(3), 152.0)
-    return frame_pages(RECTANGULAR, False, station, frame, **switches)
+    pose = [np.zeros(3), np.zeros(3), np.ones(3), np.ones(3)]
+    return frame_pages(RECTANGULAR, False, pose, 152.0, frame, **switches)
 
 
 @pytest.mark.giant("10", "page of a frame")
@@ -238,7 +244,7 @@ def test_long_names_are_printed_whole():
         control_pages(RECTANGULAR, [GroundPoint(name, (1.0, 2.0, 3.0))], (1.0, 1.0, 1.0)),
         warning_pages([ErrorWarning("POINTS", [name] * 5)]),
         iteration_pages(RECTANGULAR, [name], [], np.zeros((0, 1, 6)), f"{name} FAILED"),
-        residual_pages([PointResiduals(name, [name], np.zeros((1, 2)))], 0.0, []),
+        residual_pages([(name, [name], np.zeros((1, 2)))], 0.0, []),
         station_pages(RECTANGULAR, True, [name], ones, ones, square),
         propagated_point_pages(RECTANGULAR, [name], ["*7*"], ones, square[:, :3, :3], held),
         correction_pages(RECTANGULAR, [name], ones, held, as_published=False),
@@ -267,7 +273,7 @@ def test_section_10_warnings_have_four_names_on_a_line():
 @pytest.mark.giant("10", "triangulated points residuals")
 def test_section_10_residuals_of_a_point_on_many_frames():
     frames = [f"F{number}" for number in range(25)]
-    point = PointResiduals("P", frames, np.full((25, 2), [0.0016, -0.0004]))
+    point = ("P", frames, np.full((25, 2), [0.0016, -0.0004]))
     (page,) = residual_pages([point], 0.0, [])
     lines = [line.split() for line in page if line][2:]
     assert lines[0] == ["P", *frames[:10]]

@@ -19,13 +19,15 @@ from photogram import Iteration
 from photogram.giant import Common, ErrorWarning, GroundPoint, ImageFrame
 from photogram.giant.fields import printed_order
 from photogram.giant.printout.forms import Space, matrix_rows, printout
-from photogram.giant.printout.input import Station, control_pages, frame_pages, options_page, warning_pages
-from photogram.giant.printout.iterations import PointResiduals, iteration_pages, residual_pages, statistics
+from photogram.giant.printout.listing import control_pages, frame_pages, options_page, warning_pages
 from photogram.giant.printout.results import (
     correction_pages,
+    iteration_pages,
     point_pages,
     propagated_point_pages,
+    residual_pages,
     station_pages,
+    statistics,
 )
 from photogram.results.parts import SumsByKind
 
@@ -103,16 +105,15 @@ def test_section_10_page_of_a_frame():
     values = {row["parameter"]: float(row["value"]) for row in rows("stations_initial.csv")[:6]}
     given = [values[name] for name in ("lon", "lat", "elev", "omega", "phi", "kappa")]
     images = [row for row in rows("image_coordinates.csv") if row["frame"] == "SH9960"]
-    station = Station(
-        position=[*np.radians(given[:2]), given[2]],
-        attitude=np.radians(given[3:]),
-        position_sd=[600 * ARCSEC, 600 * ARCSEC, 60000.0],
-        attitude_sd=np.radians([90.0, 90.0, 90.0]),
-        principal_distance=-152.740,
-    )
+    pose = [
+        [*np.radians(given[:2]), given[2]],
+        np.radians(given[3:]),
+        [600 * ARCSEC, 600 * ARCSEC, 60000.0],
+        np.radians([90.0, 90.0, 90.0]),
+    ]
     xy = np.array([[float(row["x_mm"]), float(row["y_mm"])] for row in images])
     frame = ImageFrame("SH9960", [row["point"] for row in images], xy)
-    pages = frame_pages(GEOGRAPHIC, True, station, frame)
+    pages = frame_pages(GEOGRAPHIC, True, pose, -152.740, frame)
     assert len(pages) == 1
     assert contains(
         pages, "FRAME SH9960", "PRINCIPAL DISTANCE = -152.7400 ST. D. OF X = 0.0100 ST. D. OF Y = 0.0100"
@@ -189,7 +190,7 @@ def test_section_10_camera_stations_corrections():
 def test_section_10_residuals():
     listed = [row for row in rows("plate_residuals.csv") if row["point"] == "SH954201"]
     micrometres = np.array([[float(row["vx_um"]), float(row["vy_um"])] for row in listed])
-    point = PointResiduals("SH954201", [row["frame"] for row in listed], micrometres / 1000)
+    point = ("SH954201", [row["frame"] for row in listed], micrometres / 1000)
     closing = statistics(SumsByKind(0.0, 0.8, 273.6), 298, SUMMARY["unit_variance"]["value"])
     pages = residual_pages([point], 0.010, closing)
     assert contains(

@@ -21,8 +21,8 @@ from moving_blocks import (
 )
 from photogram import AdjustmentError, Attitudes, adjust, diagnose
 from photogram.diagnosis.after_adjustment import diagnosed, errors_explained, explained, remarks
-from photogram.diagnosis.clocks import counted_lines
 from photogram.diagnosis.mistakes import Adjuster
+from photogram.diagnosis.moving import counted_lines
 from photogram.diagnosis.trajectory_hints import flown_hints
 from photogram.network import Attitude, Boresight, Clock, Lines, Readout
 

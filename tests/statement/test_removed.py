@@ -13,7 +13,7 @@ import photogram
 from photogram.collection import simulate
 from photogram.formats import read
 from photogram.results.statement import tables
-from photogram.show.cells import written
+from photogram.show.forms import written
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from photogram.results.statement.lengths import (
 )
 from photogram.results.statement.request import Asked
 from photogram.results.statement.standards import accuracy, nssda, verdict
-from photogram.show.cells import written
+from photogram.show.forms import written
 from photogram.statistics import effective_freedom
 
 

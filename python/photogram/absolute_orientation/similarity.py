@@ -63,16 +63,10 @@ class Similarity:
         deviation_factor: float = 1.0,
     ) -> Self:
         """Convert the row of the core."""
-        scale, rotation, shift, control_centre, model_centre = row
-        return cls(
-            scale,
-            np.array(rotation),
-            np.array(control_centre),
-            np.array(model_centre),
-            np.array(shift),
-            tangent_covariance,
-            deviation_factor,
-        )
+        scale, *arrays = row
+        rotation, shift, control_centre, model_centre = map(np.array, arrays)
+        centres = control_centre, model_centre
+        return cls(scale, rotation, *centres, shift, tangent_covariance, deviation_factor)
 
     @classmethod
     def from_parameters(

@@ -204,16 +204,9 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
     control, model = table.vectors(CONTROL_COLUMNS), table.given(MODEL_COLUMNS)
     control_sd = table.vectors(CONTROL_SD_COLUMNS, 0.0, infinite=True)
     model_sd = table.given(MODEL_SD_COLUMNS) if weighted else None
+    units = {"ground_unit": ground_unit, "model_unit": model_unit}
     with at_place(Place(path)):
-        return Stations(
-            ids,
-            control,
-            model,
-            control_sd=control_sd,
-            model_sd=model_sd,
-            ground_unit=ground_unit,
-            model_unit=model_unit,
-        )
+        return Stations(ids, control, model, control_sd=control_sd, model_sd=model_sd, **units)
 
 
 MISSING = ("", "-")
@@ -288,7 +281,7 @@ def read_cards(
     m, n, mn = (records[1].count_of(w, name) for w, name in zip(constants, ("M", "N", "MN"), strict=False))
     if len(records) - 2 != m:
         raise records[1].error(phrase("orientation.m", m=m, n=len(records) - 2))
-    stations = _stations(path, records[2:], zero_missing, ground_unit, model_unit)
+    stations = _stations(path, records[2:], zero_missing, ground_unit=ground_unit, model_unit=model_unit)
     pairs, elevations = int(stations.given[:, :2].all(axis=1).sum()), int(stations.given[:, 2].sum())
     if (elevations, pairs) != (n, mn):
         raise records[1].error(phrase("orientation.counts", n=n, mn=mn, elevations=elevations, pairs=pairs))
@@ -303,9 +296,7 @@ def _records(path: Path) -> list[_Record]:
     return [_Record(path, number, text) for number, text in lines if text.strip()]
 
 
-def _stations(
-    path: Path, records: list[_Record], zero_missing: bool, ground_unit: str, model_unit: str
-) -> Stations:
+def _stations(path: Path, records: list[_Record], zero_missing: bool, **units: str) -> Stations:
     control, model = [], []
     ids: dict[str, None] = {}
     for record in records:
@@ -320,13 +311,7 @@ def _stations(
             raise record.error(phrase("orientation.repeated", station=words[6]))
         ids[words[6]] = None
     with at_place(Place(path)):
-        return Stations(
-            ids,
-            np.array(control).reshape(-1, 3),
-            np.array(model).reshape(-1, 3),
-            ground_unit=ground_unit,
-            model_unit=model_unit,
-        )
+        return Stations(ids, np.reshape(control, (-1, 3)), np.reshape(model, (-1, 3)), **units)
 
 
 def read_restart(path: Path, stations: Stations, messages: list[Message]) -> Similarity | None:

@@ -65,7 +65,6 @@ def print_document(document: Document, whole: str, *keys: str, remarks: Iterable
 
 
 def print_text(document: Document) -> None:
-    """Print the whole text of a document."""
     from photogram.show.forms import text
 
     output.print_block(escape(text(document).removesuffix("\n")))
@@ -82,7 +81,6 @@ def print_written(paths: Iterable[Path]) -> None:
 
 
 def print_remark(text: object) -> None:
-    """Print a remark on standard error."""
     errors.print(f"[yellow]remark:[/] {escape(str(text))}")
 
 

@@ -181,8 +181,7 @@ class Documents:
         code
             Exit code; None: of the verdict.
         """
-        from photogram.show.cells import formatted
-        from photogram.show.forms import text
+        from photogram.show.forms import formatted, text
 
         made = document or result.document()
         made = made if network is None else formatted(made)

@@ -22,8 +22,7 @@ from photogram.collection.findings import collection_held
 from photogram.collection.parameters import POSE
 from photogram.collection.result import AdjustedCollection
 from photogram.diagnosis.diagnose import check_block
-from photogram.diagnosis.diagnosis import Diagnosis
-from photogram.diagnosis.findings import Section
+from photogram.diagnosis.findings import Diagnosis, Section
 from photogram.errors import AdjustmentError
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block

@@ -9,17 +9,21 @@ errors are reported.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
+from itertools import combinations
 
 import numpy as np
 
+from photogram import _photocore
 from photogram.adjustment.snooping import snoop_block
-from photogram.diagnosis.findings import Finding, Section, section_of
+from photogram.arguments.types import Bools, Floats, Indices
+from photogram.diagnosis.findings import Finding, Level, Section, finding, section_of, small_unit
 from photogram.diagnosis.gross import Suspects
-from photogram.diagnosis.misfits import Misfits, exchanged, list_test_values
 from photogram.diagnosis.mistakes import Adjuster
 from photogram.diagnosis.tested_values import (
     FOUND,
     ROUNDING,
+    SURE,
     grouped,
     mad_sd,
     outliers,
@@ -27,12 +31,21 @@ from photogram.diagnosis.tested_values import (
     spread_of,
 )
 from photogram.errors import AdjustmentError
-from photogram.lazy_dataclasses import dataclass, field
-from photogram.network.block import Block
+from photogram.io.angles import ARCSEC
+from photogram.lazy_dataclasses import dataclass, field, replace
+from photogram.network.block import Block, flown_by
+from photogram.network.directions import seen_without_lenses
+from photogram.network.rays import Rays, meet
 from photogram.network.subset import kept_images, of_photos
+from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, OBSERVATION, POSITION, BlockSuspects
 from photogram.results.result import Result
-from photogram.results.snooping_log import Aside, Exchange
+from photogram.results.snooping_log import Aside, Exchange, Removal
 from photogram.results.snooping_options import SnoopOptions
+from photogram.results.snooping_result import Snooped
+from photogram.results.tables import Tests
+from photogram.show.quantity import Table
+from photogram.statistics.limits import normal_limit
+from photogram.words import Phrase, phrase
 
 DISTORTING = 50.0  # Test value of control whose error distorts the photos
 HOPELESS = 5.0  # Spread of the test values of photos that are removed, if they did not fit before
@@ -147,15 +160,11 @@ def _remove(
     if found.exchanged:
         return [*found.exchanged]
     edited.first, edited.last = edited.first or found.result, found.result
-    misfits = Misfits(block, suspected, found, found.result)
-    edited.section.findings += misfits.in_section
-    edited.gross += misfits.of_suspects
-    edited.control = misfits.control
+    Misfits(block, suspected, found, found.result, edited).add()
     return []
 
 
 def _with_names(block: Block, exchanges: list[Exchange]) -> Block:
-    """Return a block with exchanged names of points."""
     points = block.image_points.copy()
     for each in exchanges:
         on = block.image_photos == block.photo_ids.index(each.photos[0])
@@ -163,3 +172,223 @@ def _with_names(block: Block, exchanges: list[Exchange]) -> Block:
         points[on & (block.image_points == one)] = other
         points[on & (block.image_points == other)] = one
     return block.replace(image_points=points)
+
+
+CODES = {
+    IMAGE: "check.blunder.image",
+    CONTROL: "check.control-misfit.component",
+    POSITION: "check.station-misfit",
+    ATTITUDE: "check.station-misfit",
+}
+"""Messages by type; all others are additional observations."""
+ODDS = 20.0  # Likelihood ratio below which another observation is an alternative
+BLUNDER, TWENTIETH = 3.0, 1.96
+SHOWN = 20
+PARTED, FEWEST_OF_TWO = 0.1, 2
+"""Largest part of the residuals, and least rays per group, if one name belongs to two points."""
+AS_WELL = 3.0  # Least ratio of the remaining residual without one ray to that of two groups
+
+
+class Misfits:
+    """Findings on a block of which (m,) images of undetermined points were excluded before snooping."""
+
+    def __init__(
+        self, block: Block, suspected: Bools, found: Snooped, result: Result, edited: Edited
+    ) -> None:
+        assert isinstance(found.suspects, BlockSuspects)
+        self.block, self.suspected, self.suspects = block, suspected, found.suspects
+        self.found, self.result, self.edited = found, result, edited
+        values = sizes_of_tests(result)["image"]
+        values = values[values > 0]
+        # If errors have heavier tails than normal ones, the 95 % quantile (1.96 sd) defines the spread.
+        self.tail = max(1.0, float(np.quantile(values, 0.95)) / TWENTIETH) if values.size else 1.0
+
+    def add(self) -> None:
+        """Add the findings to the lists of the adjustment."""
+        # Errors against the others are exact, also if they are large.
+        entries = [
+            replace(entry, error=entry.prediction_error or entry.error)
+            for entry in self.found.log
+            if entry.returned is None
+        ]
+        explained = set() if flown_by(self.block) else self._parted(entries)
+        for entry in entries:
+            if self._image_of(entry) not in explained:
+                self._add(entry)
+        for each in self.found.outcome.remarks:
+            if each.code == "snooping.common":
+                self.edited.section.note("grave", "check.common-error", **each.fields)
+
+    def _image_of(self, entry: Removal) -> int:
+        """Return the number of an image; -1 for other observations."""
+        is_image = self.suspects.kinds[entry.group] == IMAGE and entry.kind != "photo"
+        return int(self.suspects.subjects[entry.group]) if is_image else -1
+
+    def _add(self, entry: Removal) -> None:
+        kind = int(self.suspects.kinds[entry.group])
+        if entry.kind == "photo":
+            photo = int(self.suspects.photos[entry.group])
+            name, count = self.block.photo_ids[photo], int((self.block.image_photos == photo).sum())
+            message = phrase("check.bad-photo.points", photo=name, n=count)
+            self.edited.gross.append(finding("grave", message, [name], values={"points": float(count)}))
+        elif kind == CONTROL:
+            point = self.block.point_ids[self.suspects.points[entry.group]]
+            self.edited.control.setdefault(point, []).extend(self._errors(entry))
+        elif kind == IMAGE and self.suspected[self._image_of(entry)]:
+            self.edited.gross += self._errors(entry)
+        else:
+            self.edited.section.findings += self._errors(entry)
+
+    def _parted(self, entries: list[Removal]) -> set[int]:
+        """Add names of two points, the rays of which intersect in two groups; return their images."""
+        block, explained = self.block, set[int]()
+        images = [image for entry in entries if entry.rows and (image := self._image_of(entry)) >= 0]
+        points, counts = np.unique(block.image_points[images], return_counts=True)
+        poses = {
+            "photo_positions": self.result.photo_positions,
+            "photo_attitudes": self.result.photo_attitudes,
+        }
+        plain, _ = seen_without_lenses(block.replace(**poses))
+        if len(plain.image_xy) < len(block.image_xy):
+            return explained
+        rays = Rays.of(plain)
+        equations = rays.equations()
+        for point in np.union1d(points[counts > 1], block.image_points[self.suspected]).tolist():
+            rows = np.flatnonzero(block.image_points == point)
+            one, other, before = _groups(rays, equations, rows)
+            if len(one):
+                first, second = (
+                    [block.photo_ids[photo] for photo in block.image_photos[own]] for own in (one, other)
+                )
+                name, unit = block.point_ids[point], block.image_unit
+                fields = {"point": name, "first": first, "second": second, "before": before, "unit": unit}
+                message = phrase("check.name-used-twice", **fields)
+                found = finding("grave", message, [*first, *second], [name], {f"residual_{unit}": before})
+                self.edited.gross.append(found)
+                explained |= {*rows.tolist()}
+        return explained
+
+    def _level(self, entry: Removal) -> Level:
+        """Return the level by the p-value, also for errors with heavier tails than normal ones."""
+        limit, freedom = SURE / self.found.outcome.tests, float(entry.dimension)
+        if math.isnan(entry.log_probability):
+            return "grave"
+        chance = _photocore.chi_square((self._test(entry) / self.tail) ** 2, freedom)
+        return "grave" if entry.log_probability < math.log(limit) and chance < limit else "look"
+
+    def _test(self, entry: Removal) -> float:
+        """Return the root of T in units of the remaining variance."""
+        return math.sqrt(entry.fisher * entry.dimension)
+
+    def _errors(self, entry: Removal) -> list[Finding]:
+        """Return findings on the component with the largest error, or on all significant ones of a vector."""
+        suspects, kind = self.suspects, int(self.suspects.kinds[entry.group])
+        code = CODES.get(kind, "check.observation-misfit")
+        if kind == IMAGE and self.suspected[self._image_of(entry)]:
+            code = "check.gross-error.one"
+        sizes = np.nan_to_num(np.abs(entry.error) / np.array(entry.error_sd)) / spread_of(self.result)
+        limit = normal_limit(self.found.outcome.tests, FOUND)
+        chosen = np.flatnonzero(sizes > limit).tolist() if kind in (CONTROL, POSITION, ATTITUDE) else []
+        points, photos = self._names(entry.group, kind)
+        fields = {"named": suspects.name(entry.group), "redundancy": entry.redundancy}
+        fields |= {"point": points[0] if points else "", "photo": photos[0] if photos else ""}
+        fields["rivals"], others = self._rivals(entry, kind)
+        (photos if kind == IMAGE else points).extend(others)
+        found = []
+        for k in chosen or [int(sizes.argmax())]:
+            row = entry.rows[k]
+            error, unit = _shown(entry.error[k], suspects.unit(row), kind)
+            test = float(sizes[k]) if len(chosen) > 1 else self._test(entry)
+            component = suspects.row_name(row)
+            message = phrase(code, component=component, error=error, unit=unit, test=test, **fields)
+            values = {f"error_{unit}".rstrip("_"): error, "test_value": test}
+            values |= {"component": float(suspects.components[row]), "redundancy": entry.redundancy}
+            found.append(finding(self._level(entry), message, photos, points, values))
+        return found
+
+    def _names(self, group: int, kind: int) -> tuple[list[str], list[str]]:
+        """Return the points and photos of a group."""
+        if kind == OBSERVATION:
+            own = self.suspects.observations[int(self.suspects.subjects[group])]
+            return [*own.points], [*own.photos]
+        point, photo = int(self.suspects.points[group]), int(self.suspects.photos[group])
+        return [self.block.point_ids[point]] * (point >= 0), [self.block.photo_ids[photo]] * (photo >= 0)
+
+    def _rivals(self, entry: Removal, kind: int) -> tuple[Phrase | str, list[str]]:
+        """Return the message on images of the point, or control points, that may be wrong instead."""
+        suspects, group = self.suspects, entry.group
+        of, ids = (suspects.points, self.block.point_ids)
+        rivals = [own.group for own in entry.rivals if own.odds < ODDS and suspects.kinds[own.group] == kind]
+        code = "check.rival.control"
+        if kind == IMAGE:
+            rivals = [own for own in rivals if suspects.points[own] == suspects.points[group]]
+            two = np.count_nonzero(self.block.image_points == suspects.points[group]) == 2
+            of, ids = suspects.photos, self.block.photo_ids
+            code = f"check.rival.{'two-rays' if two else 'images'}"
+        others = [ids[of[own]] for own in rivals if of[own] >= 0]
+        return phrase(code, names=others) if others else "", others
+
+
+def _groups(rays: Rays, equations: tuple[Floats, Floats], rows: Indices) -> tuple[Indices, Indices, float]:
+    """Return two groups of rays of a point that intersect, and the largest residual of all.
+
+    The groups are empty if a single ray explains the residuals as well.
+    """
+
+    def sizes(own: Indices) -> tuple[Floats, Bools]:
+        """Return residuals of all rays where some intersect, and whether that is in front of them."""
+        normal, constant = (each[own].sum(axis=0, keepdims=True) for each in equations)
+        position = meet(normal, constant, np.array([len(own)]))
+        residuals, in_front = rays.residuals(np.broadcast_to(position, (len(rows), 3)), rows)
+        return np.nan_to_num(np.linalg.norm(residuals, axis=1), nan=np.inf), in_front
+
+    def largest(kept: Bools) -> float:
+        return float(sizes(rows[kept])[0][kept].max())
+
+    everything = np.ones(len(rows), dtype=bool)
+    before, best = largest(everything), (math.inf, everything)
+    for pair in combinations(rows.tolist(), 2):
+        alone, in_front = sizes(np.array(pair))
+        # Rays of two points may meet anywhere, even behind the cameras, with any residual.
+        near = in_front & (alone < PARTED * min(before, float(alone[np.isfinite(alone)].max(initial=0.0))))
+        if FEWEST_OF_TWO <= near.sum() <= len(rows) - FEWEST_OF_TWO:
+            best = min(best, (max(largest(near), largest(~near)), near), key=lambda each: each[0])
+    left, near = best
+    single = min((largest(rows != row) for row in rows.tolist()), default=0.0) if len(rows) > 2 else 0.0
+    is_parted = left < PARTED * before and AS_WELL * left < single
+    return rows[near & is_parted], rows[~near & is_parted], before
+
+
+def exchanged(exchanges: Iterable[Exchange]) -> list[Finding]:
+    """Return findings on exchanged names."""
+    found = []
+    for each in exchanges:
+        message = phrase("check.exchanged-points", points=list(each.points), photo=each.photos[0])
+        values = {"statistic_as_named": each.as_named, "statistic_exchanged": each.exchanged}
+        found.append(finding("grave", message, [each.photos[0]], each.points, values))
+    return found
+
+
+def _shown(error: float, unit: str, kind: int) -> tuple[float, str]:
+    """Return an error in the unit of reports: angles in arc seconds, images in micrometres."""
+    if kind == IMAGE:
+        unit, factor = small_unit(unit)
+        return factor * error, unit
+    return (error / ARCSEC, "arcsec") if unit == "rad" else (error, unit)
+
+
+def list_test_values(result: Result, section: Section) -> None:
+    """List test values beyond 3 after all removals, the largest ones, and their number."""
+    values = sizes_of_tests(result)["image"]
+    tested = int((values > 0).sum())
+    beyond = int((values > BLUNDER).sum())
+    section.figure(
+        "robust spread of the test values", f"{spread_of(result):.3f} (1 when the weights are right)"
+    )
+    section.figure(
+        f"image coordinates beyond {BLUNDER:g} times the spread",
+        f"{beyond} of {tested} tested ({0.0027 * tested:.0f} to be expected)",
+    )
+    tests = Tests(result)
+    title = "Largest test values of the other observations"
+    section.parts.append(Table("", title, tests.columns(tests.largest(SHOWN))))

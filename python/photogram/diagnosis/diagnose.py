@@ -8,7 +8,8 @@ every observation.
 from __future__ import annotations
 
 import math
-from typing import Any
+from itertools import chain
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,30 +17,46 @@ from photogram.adjustment.adjustment import core_threads
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.arrays import argument_error
 from photogram.arguments.objects import kind_error
-from photogram.diagnosis.after_adjustment import diagnosis_of
+from photogram.diagnosis.after_adjustment import diagnosis_of, explained, remarks
 from photogram.diagnosis.blunders import Edited, edit
-from photogram.diagnosis.control import control
-from photogram.diagnosis.diagnosis import Diagnosis
-from photogram.diagnosis.findings import Finding, Section, Words, section_of
+from photogram.diagnosis.findings import (
+    Diagnosis,
+    Finding,
+    Section,
+    Words,
+    note_all,
+    note_verdict,
+    section_of,
+)
 from photogram.diagnosis.gross import Suspects, gross
-from photogram.diagnosis.key_numbers import disagreeing, held_values, key_numbers, points_left_out
 from photogram.diagnosis.lenses import half_pixel
-from photogram.diagnosis.mistakes import Adjuster
+from photogram.diagnosis.mistakes import Adjuster, View
+from photogram.diagnosis.moving import counted_lines
 from photogram.diagnosis.orientation import orientation
-from photogram.diagnosis.registry import at
-from photogram.diagnosis.residuals import residuals
+from photogram.diagnosis.registry import at, hints_at
+from photogram.diagnosis.sections import (
+    control,
+    disagreeing,
+    held_values,
+    key_numbers,
+    points_left_out,
+    residuals,
+    structure_section,
+)
 from photogram.diagnosis.stations import stations, two_ray_heights
-from photogram.diagnosis.structure import structure_section
-from photogram.diagnosis.trajectories import flown_checked
-from photogram.diagnosis.views import View
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import replace
+from photogram.messages import counted
 from photogram.network.block import Block, flown_by
 from photogram.network.film_reduction import as_seen
+from photogram.network.motion import timed_photos
 from photogram.network.rays import Rays
 from photogram.results.result import Result
 from photogram.results.snooping_result import Snooped
 from photogram.statistics.findings import Findings
+
+if TYPE_CHECKING:
+    from photogram.diagnosis.findings import Words
 
 FINAL_STATIONS = 5.0  # Median residual of adjusted stations (standard deviations)
 HARDLY = 10.0  # Multiple of the usual residual that coarse stations can cause before the adjustment
@@ -118,7 +135,7 @@ def check_block(
     # Absurd values overflow, and comparisons with them fail. Their effect is reported, not the overflow.
     with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
         if flown_by(block):
-            return flown_checked(block, given[1], given[0])
+            return _flown_checked(block, given[1], given[0])
         if np.isfinite(block.photo_positions).all() and np.isfinite(block.photo_attitudes).all():
             return _checked(block, *given)
         started, section = _started(block)
@@ -250,3 +267,37 @@ def _after_adjustment(view: View, edited: Edited, found: Findings | None, words:
         two_ray_heights(result),
         key_numbers(edited, words),
     ]
+
+
+def _flown_checked(block: Block, words: Words, adjusted: Adjuster) -> tuple[list[Section], Result | None]:
+    """Check a block with photos or records on trajectories by its adjustment and data snooping.
+
+    The other checks assume one pose per photo: any tried unit, axis or angle would be blamed for the motion.
+    """
+    structure = structure_section(block, None, words)
+    timed = timed_photos(block)
+    at_rest = {name for name, moves in zip(block.photo_ids, timed.tolist(), strict=True) if not moves}
+    # Photos on a trajectory may be tied by other observations than points.
+    structure.findings = [each for each in structure.findings if at_rest.issuperset(each.photos)]
+    section = section_of("moving")
+    section.remark(
+        "check.remark.moving",
+        flown=flown_by(block),
+        photos=counted(len(timed), "photo"),
+        timed=int(timed.sum()),
+    )
+    try:
+        result = adjusted(block)
+    except (AdjustmentError, InputError) as error:
+        section.note("grave", "check.no-adjustment", reason=str(error))
+        hints = hints_at("data", block) or hints_at("misfit", block, adjusted)
+        note_all(section, "convention", "grave", hints)
+        return [structure, section], None
+    note_all(section, "convention", "grave", explained(result))
+    note_all(section, "moving", "look", remarks(result))
+    section.findings += counted_lines(block, adjusted)
+    edited = edit(block, Suspects.none(block), adjusted)
+    if edited.last is not None and (result.converged or edited.last.converged):
+        section.findings += [*edited.gross, *edited.section.findings, *chain(*edited.control.values())]
+    note_verdict(section, result.verdict)
+    return [structure, section], result

@@ -33,12 +33,10 @@ class Suspects(NamedTuple):
 
     @classmethod
     def none(cls, block: Block) -> Suspects:
-        """Return no suspects."""
         photos, points = (np.zeros(len(ids), dtype=bool) for ids in (block.photo_ids, block.point_ids))
         return cls(photos, points, points)
 
     def excluded_from(self, block: Block) -> Block:
-        """Return a block without suspects."""
         return of_photos(kept_images(block, ~self.points[block.image_points]), ~self.photos)
 
 

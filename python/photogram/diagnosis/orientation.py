@@ -9,11 +9,10 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.diagnosis.conventions import distances_in_millimetres, verdicts
+from photogram.diagnosis.conventions import KAPPA, TURNS, distances_in_millimetres, verdicts
 from photogram.diagnosis.findings import Finding, Section, Words, finding, section_of
-from photogram.diagnosis.hypotheses import KAPPA, TURNS
+from photogram.diagnosis.mistakes import View
 from photogram.diagnosis.predictions import Predicted
-from photogram.diagnosis.views import View
 from photogram.network.block import Block
 from photogram.network.rays import Rays, frame_radius
 from photogram.words import phrase

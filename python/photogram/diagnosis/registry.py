@@ -30,36 +30,33 @@ class Mistake:
     of: str = "residuals"  # that it explains
 
     def __call__(self, *given: Any) -> Any:
-        """Search for the mistake."""
         module, name = self.search.split(".")
         return getattr(import_module(f"photogram.diagnosis.{module}"), name)(*given)
 
 
 REGISTRY = (
     Mistake("lens", "lens", "lenses.wrong_terms"),
-    Mistake("observed-positions", "set", "positions.wrong_positions"),
-    Mistake("control-set", "set", "control_sets.wrong_control", of="control-misfit"),
+    Mistake("observed-positions", "set", "sets.wrong_positions"),
+    Mistake("control-set", "set", "sets.wrong_control", of="control-misfit"),
     Mistake("convention", "data", "conventions.hints"),
     Mistake("trajectory", "data", "trajectory_hints.flown_hints"),
-    Mistake("readout", "misfit", "shutters.readout_hints"),
-    Mistake("backward-readout", "fit", "shutters.backward_readouts"),
-    Mistake("clock", "fit", "clocks.known_offsets"),
-    Mistake("seam", "fit", "film_scans.seam_hints"),
+    Mistake("readout", "misfit", "moving.readout_hints"),
+    Mistake("backward-readout", "fit", "moving.backward_readouts"),
+    Mistake("clock", "fit", "moving.known_offsets"),
+    Mistake("seam", "fit", "films.seam_hints"),
     # A film in two pieces, or one that has changed along one axis, also makes marks fail.
-    Mistake("axis", "fit", "film_marks.axis_hints", unless=("seam",)),
-    Mistake("marks", "fit", "film_marks.mark_hints", unless=("seam", "axis")),
+    Mistake("axis", "fit", "films.axis_hints", unless=("seam",)),
+    Mistake("marks", "fit", "films.mark_hints", unless=("seam", "axis")),
     Mistake("certificate", "fit", "lenses.certificate_hints"),
-    Mistake("jitter", "fit", "film_scans.line_hints"),
+    Mistake("jitter", "fit", "films.line_hints"),
 )
 
 
 def at(stage: Stage) -> tuple[Mistake, ...]:
-    """Return the mistakes of a stage."""
     return tuple(each for each in REGISTRY if each.stage == stage)
 
 
 def hints_at(stage: Stage, *given: Any) -> list[Message]:
-    """Return the messages on all mistakes of a stage."""
     found: dict[str, list[Message]] = {}
     for each in at(stage):
         if not any(found.get(kind) for kind in each.unless):

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from photogram.arguments.arrays import rows_of_each
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.results.network import AdjustedNetwork
 from photogram.results.result import Result
@@ -33,8 +34,7 @@ def mad_sd(values: Floats) -> float:
 
 def grouped(values: NDArray[Any], groups: Indices, count: int) -> list[NDArray[Any]]:
     """Return the values of each of `count` groups."""
-    order = np.argsort(groups, kind="stable")
-    return np.split(values[order], np.cumsum(np.bincount(groups, minlength=count))[:-1])
+    return [values[rows] for rows in rows_of_each(groups, count)]
 
 
 def spread_of(result: AdjustedNetwork) -> float:

@@ -3,7 +3,7 @@
 Observations are predicted from given tables, points and cameras. The misfit of observed positions is their
 difference from the trajectory at their time, relative to their spread.
 
-    m = rms(observed - predicted) / rms(observed - mean)          (:mod:`photogram.diagnosis.regression`)
+    m = rms(observed - predicted) / rms(observed - mean)          (:mod:`photogram.diagnosis.predictions`)
 
 Samples and lines of scanners are image coordinates as well. A wrong time or attitude of their trajectory
 shifts them by many lines.
@@ -19,12 +19,18 @@ from functools import partial
 import numpy as np
 
 from photogram.arguments.types import Floats, Indices
-from photogram.diagnosis.clocks import shifts
-from photogram.diagnosis.hypotheses import quaternion_readings
+from photogram.diagnosis.conventions import quaternion_readings
 from photogram.diagnosis.mistakes import Change, Proposal
-from photogram.diagnosis.positions import arm_of
-from photogram.diagnosis.predictions import Predicted, predict
-from photogram.diagnosis.regression import MOST, UNKNOWN, eligible, given_points, relative
+from photogram.diagnosis.moving import shifts
+from photogram.diagnosis.predictions import (
+    MOST,
+    UNKNOWN,
+    eligible,
+    given_points,
+    predict,
+    relative,
+)
+from photogram.diagnosis.sets import arm_of
 from photogram.errors import InputError
 from photogram.messages import Message
 from photogram.network.block import Block
@@ -43,17 +49,12 @@ from photogram.words import Phrase, phrase
 def flown_hints(block: Block) -> list[Message]:
     """Return mistakes in tables and times of trajectories, and in scan line numbers."""
     with np.errstate(all="ignore"):
-        found = (_of_images(block) if block.timed else None, _of_records(block))
+        found = [predict(_of_times("records", _shifted_records), block, _records_misfit, what="records")]
+        if block.timed:
+            looked, photos = flown_view(block)
+            tried = flown_hypotheses(looked, photos)
+            found.insert(0, predict(tried, looked, partial(flown_misfits, photos=photos)))
         return [Message(each.message) for each in found if each is not None]
-
-
-def _of_images(block: Block) -> Predicted | None:
-    looked, photos = flown_view(block)
-    return predict(flown_hypotheses(looked, photos), looked, partial(flown_misfits, photos=photos))
-
-
-def _of_records(block: Block) -> Predicted | None:
-    return predict(_of_times("records", _shifted_records), block, _records_misfit, what="records")
 
 
 def _records_misfit(block: Block) -> Floats:
@@ -102,7 +103,10 @@ def _of_times(of: str, change: Callable[..., Block]) -> Iterator[Proposal]:
 
 def _of_tables() -> Iterator[Proposal]:
     changes: dict[str, tuple[Phrase, Callable[[Table], Table]]] = {
-        "inverse": (phrase("mistake.table.inverse"), _transposed),
+        "inverse": (
+            phrase("mistake.table.inverse"),
+            lambda table: replace(table, attitudes=np.swapaxes(table.attitudes, 1, 2)),
+        ),
         "kilometres": (phrase("mistake.table.kilometres"), partial(_scaled, factor=KILOMETRE)),
         "metres": (phrase("mistake.table.metres"), partial(_scaled, factor=1 / KILOMETRE)),
     }
@@ -110,10 +114,6 @@ def _of_tables() -> Iterator[Proposal]:
         changes[name] = phrase("mistake.table.quaternions", cause=cause), partial(_read_as, name=name)
     for name, (message, change) in changes.items():
         yield Proposal(name, message, partial(_with_tables, change=change))
-
-
-def _transposed(table: Table) -> Table:
-    return replace(table, attitudes=np.swapaxes(table.attitudes, 1, 2))
 
 
 def _read_as(table: Table, name: str) -> Table:

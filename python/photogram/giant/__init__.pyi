@@ -1,11 +1,11 @@
 from .common import Common as Common
-from .diagnostics import ErrorWarning as ErrorWarning
-from .diagnostics import error_warnings as error_warnings
-from .frames import Camera as Camera
-from .frames import Frame as Frame
-from .ground import GroundPoint as GroundPoint
-from .images import ImageFrame as ImageFrame
+from .contents import Camera as Camera
+from .contents import Frame as Frame
+from .contents import GroundPoint as GroundPoint
+from .contents import ImageFrame as ImageFrame
+from .limits import ErrorWarning as ErrorWarning
 from .limits import Limits as Limits
+from .limits import error_warnings as error_warnings
 from .printout.listing import listing as listing
 from .project import Project as Project
 from .project import read_project as read_project

@@ -11,10 +11,8 @@ from numpy.typing import ArrayLike
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.giant.common import Common
-from photogram.giant.frames import ATTITUDE_SD, Frame
-from photogram.giant.ground import GroundPoint
-from photogram.giant.images import IMAGE_SD, ImageFrame
-from photogram.giant.limits import Limits, allowed_images, check_bandwidth, check_files, check_points
+from photogram.giant.contents import ATTITUDE_SD, IMAGE_SD, Frame, GroundPoint, ImageFrame
+from photogram.giant.limits import Limits, allowed_images, check_bandwidth, check_count
 from photogram.giant.records import error_at, message_at
 from photogram.messages import Message
 from photogram.network import geometry
@@ -99,7 +97,11 @@ def assemble(project: Project, limits: Limits | None = None) -> tuple[Block, lis
     """
     limits = limits or Limits()
     common, messages = project.common, list[Message]()
-    check_files(project, limits)
+    control = sum(1 + point.repeats for point in project.ground)
+    check_count("CAMERA STATIONS", len(project.frames), limits.stations, project.frames)
+    check_count("GROUND CONTROL", control, limits.control, project.ground)
+    # The guide lacks a message for N5; this one follows the others.
+    check_count("CAMERA SYSTEMS", len(project.cameras), limits.cameras)
     photos = _photos(project, messages)
     if not photos:
         raise InputError(phrase("giant.no-frames"), file=project.directory)
@@ -110,7 +112,7 @@ def assemble(project: Project, limits: Limits | None = None) -> tuple[Block, lis
     index = {name: number for number, name in enumerate(dict.fromkeys(names))}
     image_points = np.array([index[name] for name in names])
     image_photos = np.repeat(np.arange(len(images)), [len(each.points) for each in images])
-    check_points(index, limits)
+    check_count("IMAGE POINTS", len(index), limits.points)
     kept = _first_images(images, image_photos, image_points, messages)
     kept = kept[allowed_images(image_points[kept], list(index), limits, messages)]
     if limits.bandwidth is not None:

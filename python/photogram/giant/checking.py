@@ -8,10 +8,8 @@ import numpy as np
 
 from photogram.arguments.types import Bools
 from photogram.diagnosis.diagnose import check_block
-from photogram.diagnosis.diagnosis import Diagnosis
-from photogram.diagnosis.findings import Finding, Section, Words
-from photogram.giant.diagnostics import error_warnings
-from photogram.giant.limits import Limits
+from photogram.diagnosis.findings import Diagnosis, Finding, Section, Words
+from photogram.giant.limits import Limits, error_warnings
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:

@@ -127,7 +127,6 @@ class Common(Checked):
 
 
 def parse_common(source: Source) -> Common:
-    """Read COMMON."""
     if len(source.lines) < 2:
         raise source.error(phrase("giant.two-records", count=len(source.lines)))
     job = source.record(2)
@@ -171,7 +170,6 @@ def _digit(job: Record, column: int, largest: int) -> int:
 
 
 def common_records(common: Common) -> list[str]:
-    """Write COMMON."""
     if len(common.title) > 80 or not common.title.isprintable():
         raise ValueError(phrase("giant.title", value=common.title))
     if len(common.strip) > 1 or not common.strip.isprintable():

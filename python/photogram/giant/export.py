@@ -13,11 +13,17 @@ from photogram.arguments.arrays import natural_order, rows_of_each
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.giant.common import Common
+from photogram.giant.contents import (
+    CHECK_POINT,
+    Camera,
+    Frame,
+    GroundPoint,
+    ImageFrame,
+    frame_records,
+    ground_records,
+)
 from photogram.giant.fields import printed_order
 from photogram.giant.files import written
-from photogram.giant.frames import Camera, Frame, frame_records
-from photogram.giant.ground import CHECK_POINT, GroundPoint, ground_records
-from photogram.giant.images import ImageFrame
 from photogram.messages import Message
 from photogram.network.block import Block, checked, of_images_alone
 from photogram.network.refraction import Refraction, metres_per_unit
@@ -53,18 +59,10 @@ def block_files(
     distances = dict.fromkeys(of_photos)
     names = {distance: f"CAMERA{number}" for number, distance in enumerate(distances, 1)}
     cameras = [Camera(name, distance) for distance, name in names.items()]
-    rows = zip(
-        block.photo_ids,
-        stations[0],
-        _turns(stations[1]),
-        _weights("the position of photo", block.photo_ids, block.photo_position_sd),
-        _weights("the attitude of photo", block.photo_ids, block.photo_attitude_sd),
-        strict=True,
-    )
-    frames = [
-        Frame(name, _triple(position), _triple(attitude), _triple(position_sd), _triple(attitude_sd))
-        for name, position, attitude, position_sd, attitude_sd in rows
-    ]
+    position_sd = _weights("the position of photo", block.photo_ids, block.photo_position_sd)
+    attitude_sd = _weights("the attitude of photo", block.photo_ids, block.photo_attitude_sd)
+    columns = map(_triples, (stations[0], _turns(stations[1]), position_sd, attitude_sd))
+    frames = [*map(Frame, block.photo_ids, *columns)]
     images = _images(block, [names[distance] for distance in of_photos])
     return common, cameras, frames, images, _ground(block), messages
 
@@ -120,12 +118,10 @@ def _ground(block: Block) -> list[GroundPoint]:
     held = np.isfinite(block.point_sd)
     sd = np.where(held, _weights("point", block.point_ids, block.point_sd), 0.0)
     codes = (~held) @ np.array([1, 2, 4])
-    return [
-        GroundPoint(
-            block.point_ids[row], _triple(block.point_positions[row]), _triple(sd[row]), int(codes[row])
-        )
-        for row in np.flatnonzero(np.isfinite(block.point_positions).any(axis=1)).tolist()
-    ]
+    rows = np.flatnonzero(np.isfinite(block.point_positions).any(axis=1))
+    names = [block.point_ids[row] for row in rows.tolist()]
+    columns = _triples(block.point_positions[rows]), _triples(sd[rows]), codes[rows].tolist()
+    return [*map(GroundPoint, names, *columns)]
 
 
 def _weights(what: str, names: list[str], sd: Floats) -> Floats:
@@ -143,21 +139,17 @@ def _turns(attitudes: Floats) -> Floats:
     return np.column_stack([omega_phi, np.remainder(attitudes[:, 2], 2 * math.pi)])
 
 
-def _triple(values: Floats) -> Triple:
-    first, second, third = values.tolist()
-    return first, second, third
+def _triples(values: Floats) -> list[Triple]:
+    return [*zip(*values.T.tolist(), strict=True)]
 
 
 def adjusted_frames(project: Project, block: Block, positions: Floats, attitudes: Floats) -> list[Frame]:
     """Return stations for units 8 and 20: adjusted values (P, 3), input sd."""
-    turned = _turns(attitudes)
-    rows = {name: row for row, name in enumerate(block.photo_ids)}
+    stations = zip(_triples(positions), _triples(_turns(attitudes)), strict=True)
+    adjusted = dict(zip(block.photo_ids, stations, strict=True))
+    own = {frame.name: (frame.position, frame.attitude) for frame in project.frames} | adjusted
     return [
-        dataclasses.replace(
-            frame, position=_triple(positions[rows[frame.name]]), attitude=_triple(turned[rows[frame.name]])
-        )
-        if frame.name in rows
-        else frame
+        dataclasses.replace(frame, position=own[frame.name][0], attitude=own[frame.name][1])
         for frame in project.frames
     ]
 
@@ -179,13 +171,10 @@ def adjusted_ground(
         key = printed_order if as_published else natural_order
         rows.sort(key=lambda row: key(block.point_ids[row]))
     names = [block.point_ids[row] for row in rows]
-    return [
-        dataclasses.replace(
-            control.get(name) or GroundPoint(name, (0.0, 0.0, 0.0), type_code=CHECK_POINT),
-            position=_triple(positions[row]),
-        )
-        for name, row in zip(names, rows, strict=True)
-    ]
+    origin = (0.0, 0.0, 0.0)
+    points = [control.get(name) or GroundPoint(name, origin, type_code=CHECK_POINT) for name in names]
+    places = zip(points, _triples(positions[rows]), strict=True)
+    return [dataclasses.replace(point, position=position) for point, position in places]
 
 
 def adjusted_records(

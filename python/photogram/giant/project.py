@@ -12,12 +12,23 @@ from photogram.arguments.objects import path_of
 from photogram.errors import InputError
 from photogram.giant.assembly import assemble
 from photogram.giant.common import Common, common_records, parse_common
+from photogram.giant.contents import (
+    Camera,
+    Frame,
+    GroundPoint,
+    ImageFrame,
+    camera_records,
+    frame_records,
+    ground_records,
+    image_records,
+    parse_cameras,
+    parse_frames,
+    parse_ground,
+    parse_images,
+)
 from photogram.giant.export import block_files
 from photogram.giant.fields import parse_name
 from photogram.giant.files import NAMES, find_files, present_files, to_bytes, written
-from photogram.giant.frames import Camera, Frame, camera_records, frame_records, parse_cameras, parse_frames
-from photogram.giant.ground import GroundPoint, ground_records, parse_ground
-from photogram.giant.images import ImageFrame, image_records, parse_images
 from photogram.giant.limits import Limits
 from photogram.giant.records import Source
 from photogram.io.writing import write_whole

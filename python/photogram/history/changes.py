@@ -133,13 +133,8 @@ def dates_of(days: Sequence[date], names: Sequence[str]) -> Dates:
     return Dates([day.year + (day - date(day.year, 1, 1)).days / YEAR for day in days], called)
 
 
-@dataclass(frozen=True, eq=False)
-class _Hypotheses:
-    """Columns of the possible changes (k, c), and their types."""
-
-    columns: Floats
-    kinds: tuple[tuple[str, int | None], ...]
-    words: tuple[Phrase, ...]
+_Hypothesis = tuple[Floats, tuple[str, int | None], Phrase]
+"""The column (k,) of a possible change, its kind with its occasion, and its words."""
 
 
 def history(
@@ -172,7 +167,7 @@ def history(
         raise InputError(phrase("history.times", count=k, value=value_field(times)))
     named = tuple(occasions) or tuple(f"occasion {i + 1}" for i in range(k))
     hypotheses = _hypotheses(t, named, unit_of_time, regressors or {})
-    tests = m * len(hypotheses.kinds)
+    tests = m * len(hypotheses)
     quantities = names or [f"value {j + 1}" for j in range(m)]
     of_units = units or [""] * m
     if (given := [len(named), len(quantities), len(of_units)]) != [k, m, m]:
@@ -203,10 +198,9 @@ def _together(covariance: Floats, k: int, m: int) -> Floats:
 
 def _hypotheses(
     t: Floats, named: Sequence[str], unit: str, regressors: Mapping[str, tuple[ArrayLike, str]]
-) -> _Hypotheses:
+) -> list[_Hypothesis]:
     """Return the hypotheses; with two occasions, only a step."""
-    k = len(t)
-    found: list[tuple[Floats, tuple[str, int | None], Phrase]] = []
+    k, found = len(t), list[_Hypothesis]()
     for i in range(1, k):
         if t[i] > t[i - 1]:
             words = phrase("history.step", before=named[i - 1], after=named[i])
@@ -225,11 +219,7 @@ def _hypotheses(
             found.append((u - u.mean(), (name, None), words))
     if not found:
         raise InputError(phrase("history.equal-times", count=k))
-    return _Hypotheses(
-        np.column_stack([column for column, _, _ in found]),
-        tuple(kind for _, kind, _ in found),
-        tuple(each for _, _, each in found),
-    )
+    return found
 
 
 def _log10_p(t: float, freedom: float) -> float:
@@ -238,16 +228,22 @@ def _log10_p(t: float, freedom: float) -> float:
 
 
 def _series(
-    x: Floats, covariance: Floats, hypotheses: _Hypotheses, name: str, unit: str, freedom: float, level: float
+    x: Floats,
+    covariance: Floats,
+    hypotheses: list[_Hypothesis],
+    name: str,
+    unit: str,
+    freedom: float,
+    level: float,
 ) -> Series:
     """Test a quantity, accept changes by certainty, and fit them jointly."""
-    k = len(x)
+    k, columns = len(x), np.column_stack([column for column, _, _ in hypotheses])
     with np.errstate(invalid="raise", divide="raise"):
         first = fit = Fit.of(x, covariance, np.ones((k, 1)))
-    sizes, deviations = fit.tested(hypotheses.columns)
+    sizes, deviations = fit.tested(columns)
     t = sizes / deviations
     steps, drift = np.full(k - 1, math.nan), (math.nan, math.nan)
-    for column, (kind, at) in enumerate(hypotheses.kinds):
+    for column, (_, (kind, at), _) in enumerate(hypotheses):
         if kind == "step":
             assert at is not None
             steps[at - 1] = t[column]
@@ -260,15 +256,14 @@ def _series(
         if _log10_p(t[best], freedom) >= math.log10(level):
             break
         accepted.append((best, float(t[best])))
-        columns = hypotheses.columns[:, [column for column, _ in accepted]]
-        fit = Fit.of(x, covariance, np.column_stack([np.ones(k), columns]))
-        sizes, deviations = fit.tested(hypotheses.columns)
+        changed = columns[:, [column for column, _ in accepted]]
+        fit = Fit.of(x, covariance, np.column_stack([np.ones(k), changed]))
+        sizes, deviations = fit.tested(columns)
         t = sizes / deviations
     changes = []
     for row, (column, value) in enumerate(accepted, 1):
-        kind, at = hypotheses.kinds[column]
+        _, (kind, at), words = hypotheses[column]
         size, sd = float(fit.parameters[row]), math.sqrt(float(fit.cofactors[row, row]))
-        words = hypotheses.words[column]
         told = phrase("history.size", size=size, sd=sd, unit=f" {unit}".rstrip())
         what = Phrase(words.code, {**words.fields, "size": told})
         sentence = str(phrase("history.changed", quantity=name, what=what, t=value))

@@ -11,8 +11,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.history.changes import Change, History, Series
 from photogram.show import quantity
-from photogram.show.cells import unit_written
-from photogram.show.forms import record
+from photogram.show.forms import record, unit_written
 from photogram.show.judgement import judged, verdict_table
 from photogram.show.page import Document, Drawing, Section, layered
 from photogram.show.page import about as explanation

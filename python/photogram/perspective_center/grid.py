@@ -10,7 +10,7 @@ from photogram.arguments.arrays import names, number
 from photogram.arguments.fields import Checked, array, check_arrays, check_fields
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.lazy_dataclasses import dataclass, field
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.summaries import Brief
 from photogram.words import phrase
 
@@ -123,18 +123,15 @@ def joined(grids: Sequence[Grid]) -> Grid:
     """
     if not grids or len({each.principal_distance for each in grids}) != 1:
         raise InputError(phrase("projector.joined"))
-    first = grids[0]
-    return Grid(
+    return replace(
+        grids[0],
         ids=[f"{name}/{each.number}" for each in grids for name in each.ids],
         plate_xy=np.vstack([each.plate_xy for each in grids]),
         model=np.vstack([each.model for each in grids]),
-        principal_distance=first.principal_distance,
-        initial=first.initial,
-        tolerance=first.tolerance,
         readings=np.concatenate([each.readings for each in grids]),
         reading_sd=np.vstack([each.reading_sd for each in grids]),
         corrected=any(each.corrected for each in grids),
-        title=first.title,
+        number=1,
     )
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from photogram.arguments.types import Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.results.network_trial import NamedSuspects
-from photogram.show.cells import unit_written
+from photogram.show.forms import unit_written
 from photogram.show.quantity import Axis, Quantity, Table, column, of_each, records
 from photogram.statistics.findings import ALTERNATIVES, NEARLY, NEARLY_EXCHANGED
 from photogram.words import Phrase, phrase

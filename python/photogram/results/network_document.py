@@ -16,7 +16,7 @@ from photogram.results import network_tables as declared
 from photogram.results.network import AdjustedNetwork
 from photogram.results.tables import Tests
 from photogram.show import quantity
-from photogram.show.cells import unit_written
+from photogram.show.forms import unit_written
 from photogram.show.judgement import remarks_section, verdict_document, verdict_table
 from photogram.show.page import Document, Fact, Facts, Part, Section, about, significant
 from photogram.show.quantity import Quantities, Quantity, for_people, members, records

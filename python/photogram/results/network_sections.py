@@ -13,7 +13,7 @@ from photogram.results import network_tables
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.tables import check_points, observations
-from photogram.show.cells import unit_written
+from photogram.show.forms import unit_written
 from photogram.show.page import Layers, Part, Section, Text, about
 from photogram.show.quantity import Quantity, Table, for_people, named
 

@@ -25,7 +25,7 @@ from photogram.results.network_tables import (
     test_value,
 )
 from photogram.results.network_trial import KINDS, OBSERVATION, type_name
-from photogram.show.cells import unit_written
+from photogram.show.forms import unit_written
 from photogram.show.quantity import Axis, Link, Quantity, column, component, frame, joined, long
 from photogram.statistics.distributions import lambda0
 from photogram.statistics.findings import Tested

@@ -12,7 +12,7 @@ from itertools import repeat
 
 from photogram import _photocore
 from photogram.show import page as parts
-from photogram.show.cells import formatted
+from photogram.show.forms import formatted
 from photogram.show.page import Column, Document, Drawing, Fact, Facts, Judgement, Section, Table, about
 from photogram.show.sketch.svg import element, svg_of
 from photogram.words import Words

@@ -14,7 +14,7 @@ from typing import Any
 import typst
 
 from photogram.lazy_dataclasses import fields, replace
-from photogram.show.cells import formatted
+from photogram.show.forms import formatted
 from photogram.show.html import inlined
 from photogram.show.page import Column, Document, Drawing, Table
 from photogram.show.sketch.layout import width

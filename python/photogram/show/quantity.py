@@ -1,7 +1,7 @@
 """Quantities: arrays with a name and a unit, declared once for all output formats.
 
 A table is a list of quantities of the same n items. `frame` creates CSV files and data frames, `records` JSON
-documents, `results.result_files` Parquet, `show.forms` text, `show.cells` pages for the browser.
+documents, `results.result_files` Parquet, `show.forms` text, `show.html` pages for the browser.
 """
 
 from __future__ import annotations

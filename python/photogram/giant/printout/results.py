@@ -1,8 +1,9 @@
-"""Adjusted stations, ground points and corrections (sample, pages 30-54)."""
+"""The adjustment: corrections of stations, residuals (sample, pages 25-29)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -12,13 +13,111 @@ from photogram.giant.printout.forms import (
     VALUE,
     Page,
     Space,
+    Values,
     attitude,
     attitude_name,
     counts_and_rms,
+    fixed,
     headed,
     matrix_rows,
     paginate,
 )
+from photogram.results.parts import Iteration, SumsByKind
+
+CORRECTIONS = "CAMERA STATIONS CORRECTIONS"
+
+
+def iteration_pages(
+    space: Space,
+    names: Sequence[str],
+    iterations: Sequence[Iteration],
+    corrections: Floats,
+    notice: str,
+    *,
+    as_published: bool = False,
+) -> list[Page]:
+    """Return pages of k iterations with corrections (k, P, 6), radians.
+
+    The notice is below the last one; the published form lacks the line with the units.
+    """
+    if not iterations:
+        return [[*headed(CORRECTIONS), notice]]
+    pages = []
+    for iteration, values in zip(iterations, corrections.tolist(), strict=True):
+        heading = headed(
+            CORRECTIONS,
+            f"ITERATION {iteration.number}",
+            *([] if as_published else ["", f"POSITION ({space.units}), ATTITUDE (RADIANS)"]),
+        )
+        closing = [
+            "",
+            f"PROVISIONAL WEIGHTED SUM OF SQUARES ={fixed(iteration.weighted_sum_of_squares, 16, 3)}",
+        ]
+        if notice and iteration is iterations[-1]:
+            closing += ["", notice]
+        rows = [[_line(name, row)] for name, row in zip(names, values, strict=True)]
+        pages += paginate(heading, rows, closing=closing)
+    return pages
+
+
+def _line(name: str, row: Sequence[float]) -> str:
+    position, attitude = _numbers(row[:3]), _numbers(row[3:])
+    return f"{name:<10}POSITION{position}     ATTITUDE{attitude}"
+
+
+def _numbers(values: Values) -> str:
+    return "".join(fixed(value, 16, 9) for value in values)
+
+
+FRAMES_ACROSS = 10  # Frames per line
+
+
+Residuals = tuple[str, Sequence[str], Floats]
+"""A point, its k frames, and its residuals (k, 2), observed minus computed, mm."""
+
+
+def residual_pages(
+    points: Iterable[Residuals], limit: float, closing: Sequence[str], *, as_published: bool = False
+) -> list[Page]:
+    """Return the pages of residuals, with `closing` (:func:`statistics`) below.
+
+    COMMON columns 41-50 are the limit: 0 selects all points, more those with a residual beyond it, less none.
+    The published form lacks the definition of the residuals.
+    """
+    meaning = "OBSERVED MINUS COMPUTED, MICROMETERS; X ABOVE Y".center(132).rstrip()
+    heading = headed("TRIANGULATED POINTS RESIDUALS", *([] if as_published else [meaning]))
+    listed = (each for each in points if limit == 0 or (limit > 0 and (abs(each[2]) > limit).any()))
+    return paginate(heading, (entry for each in listed for entry in _entries(*each)), closing=closing)
+
+
+def _entries(name: str, frames: Sequence[str], residuals: Floats) -> Iterator[list[str]]:
+    micrometres = (1000 * residuals).round().astype(int).T
+    for row in range(0, len(frames), FRAMES_ACROSS):
+        own = slice(row, row + FRAMES_ACROSS)
+        values = ["".join(f"{value:>12d}" for value in axis[own].tolist()) for axis in micrometres]
+        names = "".join(f"{frame:>12}" for frame in frames[own])
+        yield [f"{'' if row else name:<10}{names}", *(f"{'':10}{line}" for line in values), ""]
+
+
+def statistics(sums: SumsByKind, degrees_of_freedom: float, variance: float | None) -> list[str]:
+    """Return weighted sums of squares and estimates of unit weight."""
+    parts = {"CAMERA": sums.camera, "GROUND": sums.ground, "PLATES": sums.plates, "TOTAL": sums.total}
+    lines = [
+        f"{f'WEIGHTED SUM OF SQUARES ({name})':<40} ={fixed(size, 16, 3)}" for name, size in parts.items()
+    ]
+    estimates = {"VARIANCE": variance, "ST. DEV.": None if variance is None else math.sqrt(variance)}
+    return [
+        "",
+        *lines,
+        f"{'DEGREES OF FREEDOM':.<40} ={degrees_of_freedom:>12.0f}",
+        "",
+        "A POSTERIORI ESTIMATES FOR UNIT WEIGHT",
+        *(
+            f"{name:>40} ={'UNDEFINED'.rjust(16) if value is None else fixed(value, 16, 3)}"
+            for name, value in estimates.items()
+        ),
+    ]
+
 
 POSITION, ATTITUDE = VALUE + 5, VALUE + 7  # Columns of `LNG =` and `OMEGA =` with their values
 
@@ -130,7 +229,7 @@ def _summary(space: Space, deviations: Floats, counted: Bools) -> list[str]:
     ]
 
 
-ACROSS = 4  # Points per line
+POINTS_ACROSS = 4  # Points per line
 
 
 def correction_pages(
@@ -144,8 +243,8 @@ def correction_pages(
     heading = headed("CORRECTIONS APPLIED TO GROUND CONTROL", *([] if as_published else [meaning]))
     cells = [_cells(space, *row) for row in zip(names, corrections.tolist(), held.tolist(), strict=True)]
     entries = [
-        [*("".join(cell[line] for cell in cells[row : row + ACROSS]) for line in range(3)), ""]
-        for row in range(0, len(cells), ACROSS)
+        [*("".join(cell[line] for cell in cells[row : row + POINTS_ACROSS]) for line in range(3)), ""]
+        for row in range(0, len(cells), POINTS_ACROSS)
     ]
     known = np.isfinite(corrections)
     closing = _of_components(space, corrections, known & held)
