@@ -86,7 +86,6 @@ class _Named(NamedSuspects):
         self.parameters = collection.parameters[len(POSE) :]
 
     def other_name(self, kind: int, subject: int) -> Phrase:
-        """Return the name of the camera of a photo."""
         return Phrase(f"named.photo_{KINDS[kind]}", {"photo": str(self.given.photo_ids[subject])})
 
     def other_row(self, kind: int, subject: int, component: int) -> tuple[str, str]:

@@ -69,12 +69,10 @@ class Manifest:
 
 
 def part_folder(run: Path, number: int) -> Path:
-    """Return the folder of the part of a node."""
     return run / "parts" / f"{number:05d}"
 
 
 def result_folder(run: Path, number: int) -> Path:
-    """Return the folder of the result of a node."""
     return run / "results" / f"{number:05d}"
 
 

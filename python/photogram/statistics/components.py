@@ -84,7 +84,6 @@ class Component:
 
     @property
     def factor_of_sd(self) -> float:
-        """Factor of the standard deviations."""
         return math.sqrt(self.factor)
 
     @property

@@ -19,8 +19,6 @@ from photogram.words import phrase
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fit of n values by u parameters."""
-
     root: Floats  # (n, n) L
     basis: Floats  # (n, u) B
     whitened: Floats  # (n,) residuals, observed minus fitted, of unit weight

@@ -213,7 +213,6 @@ class LensTest:
 
     @property
     def needed(self) -> bool:
-        """Whether the parameters are significant and have a notable effect."""
         return self.significant and self.notable
 
     @property

@@ -57,7 +57,6 @@ class Match:
 
     @property
     def doubtful(self) -> bool:
-        """Return whether a rejected identification may be correct."""
         return not self.accepted and self.expected <= DOUBTFUL
 
     def reason(self) -> Phrase:
@@ -164,7 +163,6 @@ def match(measured: Floats, predicted: Floats, search: Search, *, tolerance: flo
 
 
 def _mean_stars(density: float, tolerance: float) -> float:
-    """Return the mean number of stars in a tolerance area."""
     return density * math.pi * tolerance**2
 
 
