@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from photogram.distributed.cut import Incidence, counted_bytes, cut, outer_vertices, tree_of
+from photogram.distributed.cut import Incidence, counted_work, cut, outer_vertices, tree_of
 from photogram.distributed.plan import scheduled
 
 
@@ -25,17 +25,16 @@ def grid(rows, columns):
 def test_one_part_counts_what_many_do_together():
     places, incidence = grid(16, 16)
     images = np.full(256, 100.0)
-    factor, peak = counted_bytes(places, images, lambda: [incidence], 1)
-    factors, peaks = counted_bytes(places, images, lambda: [incidence], 4)
-    assert len(factor) == 1
-    assert len(factors) == 7
-    assert factors.sum() == pytest.approx(factor.sum())
-    # A part needs less memory than the whole; all of them need the contributions in addition.
-    assert peaks.max() < peak[0] < peaks.sum()
+    _, one = counted_work(places, images, lambda: [incidence], 1)
+    tree, four = counted_work(places, images, lambda: [incidence], 4)
+    assert four.photos.sum() == one.photos.sum() == 256
+    assert four.images.sum() == pytest.approx(one.images.sum(), abs=7)
+    assert four.factor.sum() == pytest.approx(one.factor.sum())
+    assert four.formation.sum() == pytest.approx(one.formation.sum())
+    assert four.outer[tree.root] == 0
+    assert (four.outer[:-1] > 0).all()
     # Dense elimination in any order: no less than the diagonal, no more than the full matrix.
-    assert 8 * 256 * 6**2 / 2 < factor[0] < 8 * (256 * 6) ** 2 / 2
-    images_alone = peak[0] - factor[0]
-    assert images_alone == pytest.approx(1300.0 * images.sum(), rel=1e-3)
+    assert 256 * 6**3 / 6 < one.factor[0] < (256 * 6) ** 3 / 6
 
 
 def test_outer_vertices_are_those_of_an_elimination():
@@ -62,10 +61,13 @@ def test_a_schedule_keeps_workers_and_ways():
     traffic = sizes, sizes, sizes
     one = scheduled(tree, seconds, seconds, seconds, traffic, 1, 1e9)
     assert (one.up, one.down, one.inversion) == (15.0, 15.0, 15.0)
+    assert one.moved_up == one.moved_down == 0.0
     many = scheduled(tree, seconds, seconds, seconds, traffic, 8, 1e9)
     # The height of the tree is as fast as it gets.
     assert many.up == pytest.approx(4.0, abs=1e-6)
     assert many.down == pytest.approx(4.0, abs=1e-6)
+    # One of two children stays where it is.
+    assert many.moved_up == many.moved_inversion == 70.0
     two = scheduled(tree, seconds, seconds, seconds, traffic, 2, 1e9)
     assert 15.0 / 2 <= two.up <= 9.0
     slow = scheduled(tree, seconds, seconds, seconds, traffic, 8, 10.0)

@@ -25,8 +25,7 @@ from photogram.adjustment.first_features import started
 from photogram.adjustment.options import AdjustOptions
 from photogram.adjustment.remarks import check_cameras
 from photogram.arguments.fields import options_of
-from photogram.arguments.types import Floats
-from photogram.distributed.cut import UNKNOWNS, alone_of, counted_bytes, incidence_of, vertices_of
+from photogram.distributed.cut import UNKNOWNS, Counts, alone_of, counted_work, incidence_of, vertices_of
 from photogram.distributed.division import Division
 from photogram.distributed.driver import Driver, Outcome
 from photogram.distributed.executors import Executor, Serial, Workers, check_workers, connected
@@ -109,7 +108,7 @@ def adjust_in_parts(
     block, core, row = _ready(block, chosen)
     room = None if division.parts is not None or division.cluster is not None else division.memory_bytes
     # A block that fits into the memory is adjusted as a whole.
-    if room is not None and _counted(block, 1)[0][0] + WHOLE * len(block.image_xy) <= room:
+    if room is not None and _counted(block, 1).factor_bytes[0] + WHOLE * len(block.image_xy) <= room:
         return adjust(block, chosen, threads=threads, progress=progress)
     with _run(block, core, row, division, threads) as run:
         result = merged(run.folder, run.manifest, block, run.adjust(progress, block))
@@ -182,14 +181,14 @@ def _run(
         )
 
 
-def _counted(block: Block, parts: int) -> tuple[Floats, Floats]:
+def _counted(block: Block, parts: int) -> Counts:
     incidence, _, _ = incidence_of(block)
     images = np.bincount(vertices_of(block)[block.image_photos], minlength=len(block.photo_ids))
     alone = alone_of(block)
     own = [each for each in block.unknowns if id(each) in alone and not each.is_held]
     poses = UNKNOWNS * (len(block.photo_ids) - len(block.timed))
     unknowns = (poses + sum(len(each.deviations) for each in own)) / len(block.photo_ids)
-    return counted_bytes(places_of(block), images.astype(float), lambda: [incidence], parts, unknowns)
+    return counted_work(places_of(block), images.astype(float), lambda: [incidence], parts, unknowns)[1]
 
 
 def fingerprint(block: Block, options: CoreOptions, row: DatumRow | None = None) -> str:
@@ -248,16 +247,16 @@ def opened(
     folder: Path,
     source: str,
     photos: int,
-    counted: Callable[[int], tuple[Floats, Floats]],
+    counted: Callable[[int], Counts],
     divided: Callable[[int], Manifest],
     division: Division,
     threads: int | None,
 ) -> Iterator[Run]:
     """Open a run: connect to workers, and divide the block unless its parts already exist.
 
-    `counted` returns :func:`counted_bytes` of a number of parts, `divided` writes the parts to the folder.
-    The folder of the division is ignored. InputError if options are invalid, workers are incompatible, or the
-    folder contains another run.
+    `counted` counts the work for a number of parts, `divided` writes the parts to the folder. The folder of
+    the division is ignored. InputError if options are invalid, workers are incompatible, or the folder
+    contains another run.
     """
     memory = division.memory_bytes
     with ExitStack() as stack:
@@ -283,7 +282,7 @@ def opened(
                 # Some parts for each worker; more if nodes would exceed the memory.
                 largest = max(photos // LEAST_PHOTOS, 1)
                 parts = min(PARTS_A_WORKER * workers if workers > 1 else 2, largest)
-                while room is not None and 2 * parts <= largest and counted(parts)[1].max() > room:
+                while room is not None and 2 * parts <= largest and counted(parts).memory_bytes.max() > room:
                     parts *= 2
             manifest = divided(parts)
         most = None if memory is None else int(SHARE * memory) + others

@@ -1,4 +1,4 @@
-"""Nested dissection of the photos of a block by position, and the memory per node of the tree.
+"""Nested dissection of the photos of a block by position, and the work per node of the tree.
 
 Photos and other unknowns of the reduced normal equations are the vertices of a graph, points and observations
 are its edges. An edge contains all vertices that it touches. The photos are halved by position, recursively.
@@ -6,8 +6,9 @@ The separator consists of the photos on the smaller side of a cut that share an 
 photos of a remaining edge are then in one part, or in separators between this part and the root (George 1973;
 Lipton, Rose and Tarjan 1979).
 
-To count the memory in advance, parts are cut further until the pieces have the size of the fronts of the
-factorisation. Bytes are then computed for dense panels, as in multifrontal elimination of the whole tree.
+To count the work in advance, parts are cut further until the pieces have the size of the fronts of the
+factorisation. Multiply-adds and memory are then computed for dense panels, as in multifrontal elimination of
+the whole tree.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from photogram.network.unknowns import Unknown
 
 UNKNOWNS = 6  # Unknowns of the pose of a photo
 SMALLEST = 8  # Minimum number of photos of a front
+FORMATION, PAIR = 200.0, 108.0  # Multiply-adds per image point, and per pair of photos that share a point
 WORD = 8.0  # Bytes of a number
 IMAGE_BYTES = 1300.0  # Peak bytes per image point, with its share of the object point
 
@@ -205,17 +207,51 @@ def _halved(positions: Floats, weights: Floats, tree: Tree) -> Indices:
     return part
 
 
-def counted_bytes(
+@dataclass(frozen=True)
+class Counts:
+    """Work of each of N nodes.
+
+    `photos` are eliminated in the node, `images` have their home there, `outer` counts unknowns of nodes
+    above that it touches. Multiply-adds are for one formation with reduction of points, one factorisation and
+    one inversion. Bytes are of the factor, and the peak of the node.
+    """
+
+    photos: Indices
+    images: Indices
+    outer: Indices
+    formation: Floats
+    factor: Floats
+    inverse: Floats
+    factor_bytes: Floats
+    memory_bytes: Floats
+
+    @property
+    def contribution_bytes(self) -> Floats:
+        """(N,) bytes sent up per iteration: U, u and the diagonal."""
+        return np.asarray(WORD * (self.outer * (self.outer + 1) / 2 + 2 * self.outer))
+
+    @property
+    def cofactor_bytes(self) -> Floats:
+        """(N,) bytes sent down in the inversion."""
+        return np.asarray(WORD * self.outer * (self.outer + 1) / 2)
+
+    @property
+    def step_bytes(self) -> Floats:
+        """(N,) bytes sent down per iteration."""
+        return np.asarray(WORD * self.outer)
+
+
+def counted_work(
     positions: Floats,
     images: Floats,
     incidences: Callable[[], Iterable[Incidence]],
     parts: int,
     unknowns: float = UNKNOWNS,
-) -> tuple[Floats, Floats]:
-    """Return the bytes of the factor of each node of a block in parts, and the peak bytes of the node.
+) -> tuple[Tree, Counts]:
+    """Count the work of a block in parts, for (P, 3) positions and (P,) image points.
 
-    Positions are (P, 3), image points (P,). `incidences` are the ties by points, possibly of a thinned block.
-    `unknowns` is the number per photo, for pose and film.
+    `incidences` are the ties by points, possibly of a thinned block. `unknowns` is the number per photo, for
+    pose and film.
     """
     pieces = 1
     while len(positions) / (parts * pieces * 2) >= SMALLEST:
@@ -231,22 +267,39 @@ def counted_bytes(
     outer = outer_vertices(deep.tree, deep.owners, list(incidences()))
     inner: Floats = unknowns * np.bincount(deep.owners, minlength=len(deep.tree)).astype(np.float64)
     above = unknowns * np.array([len(each) for each in outer], dtype=float)
+    # Symmetric, dense: I^3 / 6 for the pivot, I^2 S / 2 for the panel, I S^2 / 2 for the remainder.
+    factor = inner**3 / 6 + inner**2 * above / 2 + inner * above**2 / 2
+    numbers = inner**2 / 2 + inner * above
     contribution = above * (above + 1) / 2
     at_home = np.zeros(len(deep.tree))
+    pairs = np.zeros(len(deep.tree))
     total = max(float(sum(len(each.vertices) for each in incidences())), 1.0)
+    thinned = images.sum() / total
     for each in incidences():
+        home = homes(deep.owners, each, deep.tree.root)
         rays = np.bincount(each.edges, minlength=each.count).astype(float)
-        np.add.at(at_home, homes(deep.owners, each, deep.tree.root), images.sum() / total * rays)
+        np.add.at(at_home, home, thinned * rays)
+        np.add.at(pairs, home, thinned * rays * (rays + 1) / 2)
 
     def summed(values: Floats) -> Floats:
         return np.bincount(node_of, weights=values, minlength=len(tree)).astype(np.float64)
 
     tops = np.zeros(len(tree), dtype=np.int64)
     np.maximum.at(tops, node_of, np.arange(len(deep.tree)))
-    # Dense and symmetric: I^2 / 2 for the pivot, I S for the panel.
-    factor = WORD * summed(inner**2 / 2 + inner * above)
+    factor_bytes = WORD * summed(numbers)
     received = WORD * np.array([sum(contribution[tops[child]] for child in below) for below in tree.children])
-    return factor, factor + WORD * contribution[tops] + received + IMAGE_BYTES * summed(at_home)
+    counts = Counts(
+        photos=(summed(inner) / unknowns).round().astype(np.int64),
+        images=summed(at_home).round().astype(np.int64),
+        outer=above[tops].astype(np.int64),
+        formation=FORMATION * summed(at_home) + PAIR * summed(pairs),
+        factor=summed(factor),
+        # The selected inverse needs the products of the factorisation again, in both directions.
+        inverse=2 * summed(factor),
+        factor_bytes=factor_bytes,
+        memory_bytes=factor_bytes + WORD * contribution[tops] + received + IMAGE_BYTES * summed(at_home),
+    )
+    return tree, counts
 
 
 def outer_vertices(tree: Tree, owners: Indices, incidences: list[Incidence]) -> list[Indices]:

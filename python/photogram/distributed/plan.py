@@ -234,11 +234,14 @@ class Rates:
 
 @dataclass(frozen=True)
 class Times:
-    """Seconds to form, solve and invert on some workers."""
+    """Seconds to form, solve and invert on some workers, and bytes sent in each phase."""
 
     up: float
     down: float
     inversion: float
+    moved_up: float
+    moved_down: float
+    moved_inversion: float
 
     def whole(self, iterations: int) -> float:
         return iterations * (self.up + self.down) + self.inversion
@@ -259,23 +262,21 @@ def scheduled(
     there. Tasks on the way down run where the factors are. A worker receives one message at a time, with
     `bandwidth` bytes per second.
     """
-    forming, placed = _up(tree, up, traffic[0], workers, bandwidth)
-    solving, inverting = (
-        _down(tree, seconds, sizes, placed, workers, bandwidth)
-        for seconds, sizes in zip((down, inversion), traffic[1:], strict=True)
-    )
-    return Times(forming, solving, inverting)
+    time, moved, placed = _up(tree, up, traffic[0], workers, bandwidth)
+    step, step_moved = _down(tree, down, traffic[1], placed, workers, bandwidth)
+    invert, invert_moved = _down(tree, inversion, traffic[2], placed, workers, bandwidth)
+    return Times(time, step, invert, moved, step_moved, invert_moved)
 
 
 def _up(
     tree: Tree, seconds: Floats, sizes: Floats, workers: int, bandwidth: float
-) -> tuple[float, list[int]]:
+) -> tuple[float, float, list[int]]:
     remaining = np.zeros(len(tree))
     for node in range(tree.root, -1, -1):
         parent = tree.parents[node]
         remaining[node] = seconds[node] + (remaining[parent] if parent >= 0 else 0.0)
     free = [0.0] * workers
-    placed, done = [0] * len(tree), np.zeros(len(tree))
+    placed, done, moved = [0] * len(tree), np.zeros(len(tree)), 0.0
     left = [len(children) for children in tree.children]
     ready = [(0.0, -remaining[node], node) for node in range(len(tree)) if not left[node]]
     heapq.heapify(ready)
@@ -287,7 +288,8 @@ def _up(
         for each in choices:
             away = sum(float(sizes[child]) for child in children if placed[child] != each)
             begins.append((max(free[each], since) + away / bandwidth, away, each))
-        start, _, worker = min(begins)
+        start, away, worker = min(begins)
+        moved += away
         free[worker] = done[node] = start + seconds[node]
         placed[node] = worker
         parent = int(tree.parents[node])
@@ -296,23 +298,24 @@ def _up(
             if not left[parent]:
                 since = max(done[child] for child in tree.children[parent])
                 heapq.heappush(ready, (since, -remaining[parent], parent))
-    return float(done[tree.root]), placed
+    return float(done[tree.root]), moved, placed
 
 
 def _down(
     tree: Tree, seconds: Floats, sizes: Floats, placed: list[int], workers: int, bandwidth: float
-) -> float:
+) -> tuple[float, float]:
     below = np.array(seconds)
     for node in range(len(tree)):
         below[node] += max((below[child] for child in tree.children[node]), default=0.0)
-    free, end = [0.0] * workers, 0.0
+    free, moved, end = [0.0] * workers, 0.0, 0.0
     ready = [(0.0, -float(below[tree.root]), tree.root)]
     while ready:
         since, _, node = heapq.heappop(ready)
         worker, parent = placed[node], int(tree.parents[node])
         away = float(sizes[node]) if parent >= 0 and placed[parent] != worker else 0.0
+        moved += away
         free[worker] = max(free[worker], since) + away / bandwidth + seconds[node]
         end = max(end, free[worker])
         for child in tree.children[node]:
             heapq.heappush(ready, (free[worker], -float(below[child]), child))
-    return float(end)
+    return float(end), moved

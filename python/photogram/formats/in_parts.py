@@ -26,8 +26,10 @@ from photogram.arguments.arrays import repeated_pairs
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.distributed.adjust import Run, opened
 from photogram.distributed.cut import (
+    Counts,
     Incidence,
-    counted_bytes,
+    Tree,
+    counted_work,
     cut,
     homes,
     incidence_of_points,
@@ -163,9 +165,9 @@ class Streamed:
             digest.update(f"{name} {found.st_size} {found.st_mtime_ns}".encode())
         return digest.hexdigest()
 
-    def counted(self, parts: int) -> tuple[Floats, Floats]:
-        """Return the bytes of the factors, and the peak bytes, of a number of parts."""
-        return counted_bytes(places_of(self.block), self.images, self._incidences, parts)
+    def counted(self, parts: int) -> tuple[Tree, Counts]:
+        """Return the counted work for a number of parts."""
+        return counted_work(places_of(self.block), self.images, self._incidences, parts)
 
     def divided(self, run: Path, parts: int, options: CoreOptions, source: str) -> Manifest:
         """Write a number of parts into the folder of a run, and remove the buckets."""
@@ -345,7 +347,7 @@ def on_disk(
             folder,
             source,
             len(streamed.block.photo_ids),
-            streamed.counted,
+            lambda parts: streamed.counted(parts)[1],
             lambda parts: streamed.divided(folder, parts, options, source),
             division,
             threads,
