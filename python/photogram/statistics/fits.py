@@ -29,12 +29,7 @@ class Fit:
     def of(cls, values: Floats, covariance: Floats, columns: Floats) -> Fit:
         """Fit values (n,) with a covariance (n, n) by columns (n, u).
 
-        Raises
-        ------
-        InputError
-            If the covariance is not positive definite.
-        numpy.linalg.LinAlgError
-            If the columns are linearly dependent.
+        InputError if the covariance is not positive definite, LinAlgError if columns are dependent.
         """
         scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         try:
