@@ -130,7 +130,7 @@ def test_a_block_that_does_not_fit_is_refused(monkeypatch):
 
 def test_a_collection_that_does_not_fit_is_refused(monkeypatch):
     collection = simulate_collection(photos=4, points=20).collection
-    monkeypatch.setattr("photogram.collection.core_arrays.available_memory", lambda: 1 << 20)
+    monkeypatch.setattr("photogram.collection.result.available_memory", lambda: 1 << 20)
     with pytest.raises(OutOfMemoryError, match=r"of memory, and 1\.0 MiB are free"):
         adjust_collection(collection)
 

@@ -18,8 +18,7 @@ from photogram.adjustment.options import AdjustOptions, Ordering
 from photogram.adjustment.remarks import hardly_determined, harmful_points, hidden, rounded
 from photogram.adjustment.robust import Loss, remark
 from photogram.arguments.arrays import truth_value
-from photogram.collection.core_arrays import collection_network, named
-from photogram.collection.result import AdjustedCollection
+from photogram.collection.result import AdjustedCollection, collection_network, named
 from photogram.lazy_dataclasses import replace
 from photogram.messages import Message, Undetermined
 from photogram.network.core_arrays import CoreOptions

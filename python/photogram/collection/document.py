@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.collection.parameters import POSE
+from photogram.collection.collection import POSE
 from photogram.plots.accessor import drawings
 from photogram.results.network_document import (
     network_document,
@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 @np.errstate(over="ignore", invalid="ignore")
 def collection_document(result: AdjustedCollection) -> Document:
-    """Return the document of an adjusted collection."""
     given, variance = result.collection, result.variance_of_unit_weight
     size = [
         used_fact("Photos", result.photo_images > 0),

@@ -31,7 +31,6 @@ _TABLES = {"control": "control", "stations": "station"}  # Tables of files, with
 
 
 def collection_files(result: AdjustedCollection) -> dict[str, Content]:
-    """Return the files of the result of a collection."""
     given = result.collection
     leading = {
         "photos": [_numbers("photo", np.arange(len(given.photo_parameters)))],

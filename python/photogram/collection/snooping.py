@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,10 +18,9 @@ from photogram.adjustment.snooping import finished, gone, used_images
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjust import adjust, adjusted
-from photogram.collection.core_arrays import collection_network, collection_trial
+from photogram.collection.collection import POSE
 from photogram.collection.findings import collection_held
-from photogram.collection.parameters import POSE
-from photogram.collection.result import AdjustedCollection
+from photogram.collection.result import AdjustedCollection, collection_trial
 from photogram.diagnosis.diagnose import check_block
 from photogram.diagnosis.findings import Diagnosis, Section
 from photogram.errors import AdjustmentError
@@ -65,17 +65,15 @@ def snoop_collection(
 
     def tried(covariance: bool) -> tuple[AdjustedCollection, NetworkTrial, Outcome]:
         first = adjust(collection, covariance=covariance, threads=threads, progress=progress, **changes)
-        own = dataclasses.replace(first.options, covariance=True, loss=None)
-        core = collection_network(collection, own).trial(first.state, threads=core_threads(threads))
-        trial = collection_trial(collection, core, parts=options.parts)
+        trial_at = partial(collection_trial, collection, first.options, threads=core_threads(threads))
+        trial = trial_at(first.state, parts=options.parts)
 
         def afresh() -> Aside | None:
             found = started_robustly(collection, first.options, threads=threads)
             if found is None:
                 return None
             state, images = found
-            core = collection_network(collection, own).trial(state, threads=core_threads(threads))
-            trial.restart(core)
+            trial.restart(trial_at(state).core)
             return Aside(images, {}, BY_LOSSES)
 
         return first, trial, snooped(trial, options, afresh)

@@ -124,17 +124,17 @@ def intersect_legs(legs_um: Floats) -> Floats:
     return meeting
 
 
-def reduce_legs(case: Case) -> tuple[Case, frozenset[int], list[Message]]:
+def reduce_legs(case: Case) -> tuple[Case, list[Message]]:
     """Replace the leg readings of each point by one intersection.
 
     Readings of each leg are averaged first. Points with fewer than four legs are omitted with a warning. The
-    results are the case, the intersected points and the warnings.
+    results are the case and the warnings.
     """
     if not case.legs.any():
-        return case, frozenset(), []
+        return case, []
     keep = case.legs == 0
     xy_um = case.xy_um.copy()
-    reduced, messages = set(), []
+    messages = list[Message]()
     on_legs = np.flatnonzero(case.legs > 0)
     on_intersections = set(case.points[keep].tolist())
     for point, own_rows in rows_by_point(case.points[on_legs]):
@@ -150,7 +150,6 @@ def reduce_legs(case: Case) -> tuple[Case, frozenset[int], list[Message]]:
         with at_place(place, phrase("comparators.point", case=case.number, point=point)):
             xy_um[rows[0]] = intersect_legs(np.array([case.xy_um[leg].mean(axis=0) for leg in legs]))
         keep[rows[0]] = True
-        reduced.add(point)
     rows = np.flatnonzero(keep)
     without = replace(
         case,
@@ -159,7 +158,7 @@ def reduce_legs(case: Case) -> tuple[Case, frozenset[int], list[Message]]:
         xy_um=xy_um[rows],
         places=tuple(case.places[row] for row in rows),
     )
-    return without, frozenset(reduced), messages
+    return without, messages
 
 
 SCALES = (0.5, 2.0)  # outside it, units of measurements and grid differ
@@ -174,7 +173,6 @@ class PlacedCase:
     means_um: Floats  # (n, 2) mean comparator coordinates
     grid_um: Floats  # (n, 2) grid coordinates, X and Y exchanged if the comparator is left-handed
     orientation: Orientation
-    from_legs: frozenset[int]  # points measured on their legs
 
     @property
     def number(self) -> int:
@@ -192,7 +190,7 @@ def place_case(case: Case, grid: Grid, *, as_published: bool = False) -> tuple[P
     `as_published` orders the points like subroutine GROUP, which may exchange points.
     """
     name = phrase("comparators.case", case=case.number)
-    reduced, from_legs, messages = reduce_legs(case)
+    reduced, messages = reduce_legs(case)
     if (count := len(np.unique(reduced.points))) < 3:
         too_few = phrase("comparators.few-points", count=count, least=LEAST_POINTS)
         raise case.place.error(phrase("error.at", what=name, message=too_few))
@@ -222,7 +220,6 @@ def place_case(case: Case, grid: Grid, *, as_published: bool = False) -> tuple[P
         means_um=means,
         grid_um=exchanged(grid.xy_um[grid.rows_of(points)], orientation.left_handed),
         orientation=orientation,
-        from_legs=from_legs,
     )
     spread, extent = (np.linalg.norm(xy - xy.mean(axis=0)) for xy in (means, placed.grid_um))
     if not SCALES[0] < extent / spread < SCALES[1]:

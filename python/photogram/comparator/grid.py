@@ -37,7 +37,6 @@ def text_of(place: Place, text: str, key: str) -> str:
 
 
 def switch(place: Place, text: str, key: str) -> bool:
-    """Return a setting given as yes or no."""
     with at_place(place):
         require(text.lower() in ("yes", "no"), key, "choice", value=text, names=["yes", "no"])
     return text.lower() == "yes"

@@ -46,8 +46,6 @@ class JointCase:
 
 @dataclass(frozen=True, eq=False)
 class JointPlate:
-    """Plate after the joint adjustment, in its own axes."""
-
     points: Indices  # (l,) measured points
     corrections_um: Floats  # (l, 2) adjusted minus given coordinates
     covariance_um2: Floats  # (l, 2, 2) covariance of the adjusted coordinates

@@ -110,7 +110,6 @@ def _plate_case(record: Record, columns: tuple[int, int]) -> tuple[int, int]:
 
 
 def check_number(place: Failing, what: str, number: int, low: int, high: int) -> None:
-    """Reject a case or leg number outside its range."""
     with at_place(place):
         require(low <= number <= high, what, "range", value=number, low=low, high=high)
 

@@ -51,7 +51,6 @@ def sketches(calibration: Calibration) -> dict[str, Plot]:
 
 
 def plotters(calibration: Calibration) -> dict[str, Callable[[], Plot]]:
-    """Return the plot functions of a calibration, by short names."""
     nonlinear, joint = calibration.nonlinear, calibration.joint
     made: dict[str, Callable[[], Plot]] = {
         "variance": partial(variance_bars, calibration),

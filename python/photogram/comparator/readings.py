@@ -395,8 +395,6 @@ class Precision:
 
 @dataclass(frozen=True, eq=False)
 class PointReadings:
-    """Summary of the readings of one point in one case."""
-
     point: int  # Point number; number of readings
     count: int
     mean_um: Floats = field(repr=False)  # (2,) mean (equation 1)

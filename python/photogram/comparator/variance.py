@@ -30,8 +30,6 @@ from photogram.statistics.distributions import critical_chi_square, log_chi_squa
 
 @dataclass(frozen=True, eq=False)
 class CombinedLinear:
-    """Combined linear parameters of all cases."""
-
     correction: Correction  # Scales and lack of orthogonality
     sigma0_um: float  # Standard error of unit weight and its degrees of freedom (equation 57)
     degrees_of_freedom: int
@@ -54,8 +52,6 @@ class SinglePolynomial:
 
 @dataclass(frozen=True, eq=False)
 class CombinedPolynomial:
-    """Combined polynomials of all cases."""
-
     correction: Correction  # Linear parameters and polynomials
     polynomial: Polynomial
     sigma_um: tuple[float, float]  # (2,) standard deviations of the residuals in x and in y (equation 62)
@@ -242,8 +238,6 @@ OWN_TERMS = 6
 
 @dataclass(frozen=True)
 class TermTest:
-    """Student's test of one term, given all others."""
-
     axis: str  # `x` or `y`, and the term, its argument relative to the centre of the measured range
     term: str
     coefficient_um: float  # Its effect at the edge of the range, and the standard deviation

@@ -62,7 +62,6 @@ class Tree(Valued):
 
     @property
     def root(self) -> int:
-        """Last node."""
         return len(self.parents) - 1
 
     @property
@@ -90,7 +89,6 @@ class Cut:
 
 
 def tree_of(parts: int) -> Tree:
-    """Return a balanced tree over a number of parts."""
     parents: list[int] = []
     children: list[tuple[int, ...]] = []
     spans: list[tuple[int, int]] = []

@@ -50,7 +50,6 @@ class Serial:
         self._failed: dict[int, Exception] = {}
 
     def submit(self, function: Callable[..., Any], *arguments: Any, near: str = "", cost: float = 0.0) -> int:
-        """Run a task."""
         del near, cost
         self._count += 1
         own = _Handle(self._count)
@@ -67,15 +66,12 @@ class Serial:
         return own
 
     def places(self) -> list[str]:
-        """Return the only location."""
         return [""]
 
     def first(self, handles: Collection[int]) -> int:
-        """Return the task that finished first."""
         return min(handles)
 
     def value(self, handle: int) -> Any:
-        """Return the result of a task."""
         if handle in self._failed:
             raise self._failed[handle]
         # Only this process writes here, in a private folder of the user.
@@ -83,13 +79,11 @@ class Serial:
             return pickle.load(file)
 
     def forget(self, handles: Collection[int]) -> None:
-        """Delete the results of tasks."""
         for each in handles:
             self._path(each).unlink(missing_ok=True)
             self._failed.pop(each, None)
 
     def stop(self) -> None:
-        """Delete all results."""
         shutil.rmtree(self._folder, ignore_errors=True)
 
     def _path(self, number: int) -> Path:
@@ -137,15 +131,12 @@ class Workers:
         return found
 
     def places(self) -> list[str]:
-        """Return the addresses of the workers."""
         return sorted(self._client.nthreads())
 
     def first(self, handles: Collection[Future]) -> Future:
-        """Wait for the first finished task."""
         return next(iter(_library().wait(list(handles), return_when="FIRST_COMPLETED").done))
 
     def value(self, handle: Future) -> Any:
-        """Return the result of a task."""
         from distributed.client import FutureCancelledError
 
         from distributed import KilledWorker
@@ -158,13 +149,11 @@ class Workers:
             raise AdjustmentError(phrase("parts.scheduler-lost", error=error)) from None
 
     def forget(self, handles: Collection[Future]) -> None:
-        """Release the results of tasks."""
         for each in handles:
             each.release()
             self._futures.discard(each)
 
     def stop(self) -> None:
-        """Cancel all tasks."""
         futures, self._futures = list(self._futures), set()
         if futures and self._client.status == "running":
             self._client.cancel(futures, force=True)

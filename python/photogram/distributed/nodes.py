@@ -32,8 +32,6 @@ OUTCOME = "outcome.json"
 
 
 class CoreEngine:
-    """Access to the nodes of the core."""
-
     def node(self, run: Path, number: int) -> _photocore.Node:
         """Return a node; InputError for a damaged part, others as in :func:`photogram.adjust`."""
         manifest = read_manifest(run)

@@ -244,7 +244,6 @@ class Times:
     moved_inversion: float
 
     def whole(self, iterations: int) -> float:
-        """Return the seconds of an adjustment with a number of formations and one inversion."""
         return iterations * (self.up + self.down) + self.inversion
 
 

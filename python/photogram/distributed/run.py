@@ -20,13 +20,13 @@ from photogram.distributed.cut import (
     incidence_of,
     photos_of_unknowns,
     shared_cameras,
-    tree_of,
     vertices_of,
 )
 from photogram.distributed.files import read_json, write_json
 from photogram.distributed.parts import Names, Part, names_above, part_of, read_part, write_part
 from photogram.errors import AdjustmentError, InputError
-from photogram.lazy_dataclasses import asdict, dataclass, field, replace
+from photogram.io.structure import Decoder, Encoder
+from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.block import Block, flown_by
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import DatumRow
@@ -39,7 +39,6 @@ from photogram.results.parts import Iteration
 from photogram.words import phrase
 
 MANIFEST = "run.json"
-_PLAIN = ("version", "source", "middle", "weighted", "photos", "points", "images", "seals", "held", "datum")
 PROGRESS = "progress.json"
 
 
@@ -70,12 +69,10 @@ class Manifest:
 
 
 def part_folder(run: Path, number: int) -> Path:
-    """Return the folder of the part of a node."""
     return run / "parts" / f"{number:05d}"
 
 
 def result_folder(run: Path, number: int) -> Path:
-    """Return the folder of the result of a node."""
     return run / "results" / f"{number:05d}"
 
 
@@ -171,11 +168,7 @@ def divided(
     facts = dict(zip(names, of_nodes, strict=True)) | {"seals": seals, "held": held, "datum": datum}
     manifest = Manifest(_photocore.__version__, source, tree, outer, (x, y, z), options, **facts)
     # This file completes a partition.
-    document = {name: getattr(manifest, name) for name in _PLAIN}
-    document["parts"] = (len(manifest.tree) + 1) // 2
-    document["outer"] = [list(each) for each in manifest.outer]
-    document["options"] = asdict(manifest.options)
-    write_json(run / MANIFEST, document)
+    write_json(run / MANIFEST, Encoder().fields(manifest))
     return manifest
 
 
@@ -208,21 +201,8 @@ def read_manifest(run: Path) -> Manifest:
     document = read_json(run / MANIFEST)
     if (started := document.get("version")) != (version := _photocore.__version__):
         raise InputError(phrase("parts.other-version", version=version, started=started), file=run / MANIFEST)
-    options = document["options"]
-    loss, minimum = options["loss"], options["minimum"]
-    options["loss"] = loss and tuple(loss)
-    options["minimum"] = minimum and (minimum[0], minimum[1] and tuple(minimum[1]))
-    plain = {name: document[name] for name in _PLAIN}
-    plain["middle"] = tuple(plain["middle"])
-    plain["held"] = [(photo, number) for photo, number in plain["held"]]
-    if plain["datum"] is not None:
-        plain["datum"] = tuple(plain["datum"])
-    return Manifest(
-        tree=tree_of(document["parts"]),
-        outer=[Names(*rows) for rows in document["outer"]],
-        options=CoreOptions(**options),
-        **plain,
-    )
+    members = Decoder((CoreOptions, Tree), run / MANIFEST).fields(document)
+    return Manifest(**members | {"outer": [Names(*rows) for rows in members["outer"]]})
 
 
 def read_node(run: Path, manifest: Manifest, number: int) -> Part:
@@ -296,7 +276,7 @@ class Course:
 
     def write(self, run: Path, source: str) -> None:
         """Write the progress to the folder of a run, with the hash of its block."""
-        write_json(run / PROGRESS, asdict(self) | {"source": source})
+        write_json(run / PROGRESS, Encoder().fields(self) | {"source": source})
 
     @classmethod
     def read(cls, run: Path, source: str) -> Course:
@@ -309,6 +289,4 @@ class Course:
         document = read_json(run / PROGRESS)
         if document.pop("source", None) != source:
             raise InputError(phrase("parts.other-progress"), file=run / PROGRESS)
-        document["iterations"] = [Iteration(**row) for row in document["iterations"]]
-        document["ending"] = document["ending"] and tuple(document["ending"])
-        return cls(**document)
+        return cls(**Decoder((Iteration,), run / PROGRESS).fields(document, cls))

@@ -11,26 +11,21 @@ from photogram.memory import give_back, resident_memory
 
 
 class Shelf:
-    """Cache of the nodes and factors of a process."""
-
     def __init__(self) -> None:
         self.lock = threading.RLock()
         self._kept: OrderedDict[tuple[Any, ...], tuple[Any, float]] = OrderedDict()
 
     def get(self, key: tuple[Any, ...]) -> Any:
-        """Return the object of a key; None if absent."""
         if key not in self._kept:
             return None
         self._kept.move_to_end(key)
         return self._kept[key][0]
 
     def put(self, key: tuple[Any, ...], value: object, size: float) -> None:
-        """Store an object and its size in bytes."""
         self._kept[key] = value, size
         self._kept.move_to_end(key)
 
     def take(self, key: tuple[Any, ...]) -> Any:
-        """Return and remove the object of a key."""
         return self._kept.pop(key, (None, 0.0))[0]
 
     def make_room(self, needed: float, memory: int | None, spared: tuple[Any, ...]) -> None:
@@ -56,12 +51,10 @@ class Shelf:
             give_back()
 
     def drop(self, of: Callable[[tuple[Any, ...]], bool]) -> None:
-        """Remove the objects of some keys."""
         for key in [key for key in self._kept if of(key)]:
             del self._kept[key]
 
     def clear(self) -> None:
-        """Remove all objects."""
         self._kept.clear()
 
     def clear_unless_used(self) -> None:

@@ -73,8 +73,6 @@ class Point:
 
 @dataclass(frozen=True)
 class Formed:
-    """Summary of a formed node for the driver."""
-
     sum_of_squares: float
     decrease: float
     place: str
@@ -122,7 +120,6 @@ class Inverted:
 
 
 def state_path(folder: Path, number: int, state: str) -> Path:
-    """Return the file of a state of a node."""
     return folder / "states" / f"{number:05d}" / f"{state}.npz"
 
 
@@ -340,7 +337,6 @@ def located(job: Job, number: int, state: str) -> tuple[Indices, Floats]:
 
 
 def predicted(job: Job, number: int) -> dict[str, float]:
-    """Return the predicted work and memory of a node."""
     with shelf.lock:
         return _prediction(job, _node(job, number))
 

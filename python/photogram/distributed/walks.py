@@ -47,8 +47,6 @@ class Up:
 
 
 class LostFactorError(PhotogramError):
-    """Lost factor of a node, which must be formed again."""
-
     def __init__(self, number: int) -> None:
         super().__init__(f"the factor of node {number} is lost")
         self.number = number
@@ -230,16 +228,13 @@ class Walks:
         return [found[node] for node in self.nodes]
 
     def forget(self, up: Up) -> None:
-        """Release normal equations."""
         self.executor.forget(list(up.contributions.values()))
 
     def remove(self, state: str) -> None:
-        """Delete a state of all nodes."""
         for node in self.nodes:
             state_path(self.job.folder, node, state).unlink(missing_ok=True)
 
     def tell(self, phase: str, done: int, total: int, iteration: Iteration | None = None) -> None:
-        """Call `progress`."""
         if self._progress is not None:
             self._progress(Progress(phase, done, total, iteration))
 

@@ -84,7 +84,6 @@ class Component:
 
     @property
     def factor_of_sd(self) -> float:
-        """Factor of the standard deviations."""
         return math.sqrt(self.factor)
 
     @property
@@ -135,16 +134,9 @@ def helmert_step(matrix: Floats, squares: Floats, free: list[int]) -> Floats:
 
 
 def balanced(matrix: Floats, redundancy: Floats, exact: Sequence[bool]) -> Floats:
-    """Return a symmetric Helmert matrix whose rows sum to the redundancy.
+    """Return a symmetric (G, G) Helmert matrix whose rows sum to the redundancy r (G,).
 
-    Parameters
-    ----------
-    matrix
-        (G, G) matrix; its columns are exact or were estimated with random signs.
-    redundancy
-        (G,) r.
-    exact
-        (G,) True for exact columns, which are not changed.
+    Columns are exact (G,), and not changed, or were estimated with random signs.
     """
     sure = np.asarray(exact, dtype=bool)
     found = np.where(sure[:, np.newaxis] & ~sure, matrix.T, matrix)
@@ -164,45 +156,20 @@ def balanced(matrix: Floats, redundancy: Floats, exact: Sequence[bool]) -> Float
 
 @dataclass(frozen=True)
 class Settings(Checked):
-    """Options of :func:`estimate`.
-
-    Attributes
-    ----------
-    tolerance
-        Relative tolerance. The iteration stops if no component changes by more than it, or by more than a
-        hundredth of its standard deviation (and a hundred times the tolerance). A last Helmert step must then
-        change none by more than a hundred times the tolerance.
-    max_steps
-        Maximum number of steps.
-    least_redundancy
-        Least redundancy of a group to be estimated.
-    level
-        Joint significance level of the tests against 1.
-    equality
-        True to test that all are equal, with some additional adjustments.
-    """
-
+    # The iteration stops if no component changes by more than this part, or by more than a hundredth of its
+    # standard deviation (and a hundred times this). A last Helmert step must then change none by more than a
+    # hundred times this
     tolerance: float = option(1e-4, 0, 1, is_open=True)
     max_steps: int = option(100, 1)
-    least_redundancy: float = LEAST_REDUNDANCY
-    level: float = 0.05
-    equality: bool = True
+    least_redundancy: float = LEAST_REDUNDANCY  # Of an estimated group
+    level: float = 0.05  # Joint significance level of the tests against 1
+    equality: bool = True  # Test that all are equal, with some additional adjustments
 
 
 def estimate(
     adjust: Callable[[Floats], Weighted], groups: GroupsOf, settings: Settings | None = None
 ) -> Estimate:
-    """Estimate variance components.
-
-    Parameters
-    ----------
-    adjust
-        Function that adjusts with (G,) components; called first with ones.
-    groups
-        The groups.
-    settings
-        The options; None: the defaults.
-    """
+    """Estimate variance components; `adjust` adjusts with (G,) of them, first with ones."""
     run = _Run(adjust, groups, settings or Settings())
     while not run.iterate():
         pass

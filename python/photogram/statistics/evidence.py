@@ -76,19 +76,15 @@ class Test:
 
     @property
     def name(self) -> str:
-        """Name of the tested observations, in English."""
         return f"{self.kind}: {self.subject}" if self.subject else str(self.kind)
 
     def document(self) -> dict[str, Any]:
-        """Return the members of the test in JSON documents."""
         own = asdict(self)
         del own["kind"], own["subject"]
         return {"name": self.name, **own}
 
 
 class Evidence:
-    """Conditions of the rules, evaluated from the findings."""
-
     def __init__(self, found: Findings) -> None:
         self.found = found
         self.test = found.global_test
@@ -104,7 +100,6 @@ class Evidence:
 
     @cached_property
     def level(self) -> float:
-        """Level of each single test."""
         return bonferroni(self.found.level, self.number)
 
     @cached_property
@@ -234,7 +229,6 @@ class Evidence:
 
     @cached_property
     def pattern(self) -> bool:
-        """Whether a pattern of residuals is significant and large."""
         return any(each.significant and each.large for each in self.found.systematic)
 
     @cached_property
@@ -288,7 +282,6 @@ class Evidence:
         return self.test.factor if self.test is not None else math.nan
 
     def interval(self) -> Phrase:
-        """Return the factor with its interval."""
         assert self.test is not None
         return factor_of(self.test)
 
@@ -347,12 +340,10 @@ class Evidence:
 
 
 def part_of(name: Text, statistic: str, value: float) -> Phrase:
-    """Return the message on a test."""
     return Phrase("part.test", {"name": name, "statistic": statistic, "value": value})
 
 
 def factor_of(test: GlobalTest) -> Phrase:
-    """Return the factor of a test with its interval."""
     low, high = test.interval
     return Phrase("part.factor", {"factor": test.factor, "low": low, "high": high})
 

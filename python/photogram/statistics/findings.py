@@ -52,7 +52,6 @@ class Tested:
         return self._some(marks)
 
     def _some(self, marks: Bools) -> Tested:
-        """Return the marked tests as a vector."""
         dimension, second = (
             np.broadcast_to(np.asarray(each), marks.shape)[marks] for each in (self.dimension, self.second)
         )
@@ -157,7 +156,6 @@ class Agreement:
     joint: tuple[Indices, Floats, Floats] | None = None
 
     def difference(self, place: tuple[int, ...]) -> Phrase:
-        """Return the name of the point at an index, and its difference."""
         fields = self.apart(place, self.sd[place[0]])
         return Phrase("part.check", {"name": self.points.name(place), **fields})
 
@@ -208,7 +206,6 @@ class TypeFactor:
 
     @property
     def _freedom(self) -> float:
-        """Degrees of freedom of the test."""
         return self.redundancy**2 / self._spread
 
     @property
@@ -305,7 +302,6 @@ class Removed:
 
     @property
     def total(self) -> int:
-        """Number of removed observations."""
         return len(self.removed) if self.number is None else self.number
 
     def share(self, kind: Text) -> float:
@@ -325,8 +321,6 @@ class Removed:
 
 @dataclass(frozen=True, kw_only=True)
 class Findings:
-    """Information for the verdict on an adjustment."""
-
     status: str  # `converged`, or another end of the iteration
     observations: Sequence[Tested]  # Tests of single observations or groups of every type
     degrees_of_freedom: float  # f

@@ -19,8 +19,6 @@ from photogram.words import phrase
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A fit of n values by u parameters."""
-
     root: Floats  # (n, n) L
     basis: Floats  # (n, u) B
     whitened: Floats  # (n,) residuals, observed minus fitted, of unit weight
@@ -31,12 +29,7 @@ class Fit:
     def of(cls, values: Floats, covariance: Floats, columns: Floats) -> Fit:
         """Fit values (n,) with a covariance (n, n) by columns (n, u).
 
-        Raises
-        ------
-        InputError
-            If the covariance is not positive definite.
-        numpy.linalg.LinAlgError
-            If the columns are linearly dependent.
+        InputError if the covariance is not positive definite, LinAlgError if columns are dependent.
         """
         scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         try:

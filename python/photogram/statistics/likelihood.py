@@ -38,8 +38,6 @@ TESTED = 4.0  # Smallest degrees of freedom of an accepted hypothesis
 
 @dataclass(frozen=True)
 class Judged:
-    """The hypotheses that explain the residuals best."""
-
     # Indices of the accepted hypotheses, best first; several if inseparable
     best: tuple[int, ...]
     likelihood: float  # lambda of the first

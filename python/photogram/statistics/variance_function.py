@@ -39,8 +39,6 @@ class Residuals(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class FunctionEstimate:
-    """Coefficients of a variance function."""
-
     # coefficients, sd: (t,) of the terms, in the given variances, with their standard deviations
     coefficients: Floats
     sd: Floats
@@ -68,7 +66,6 @@ def nonnegative(normal: Floats, right: Floats) -> Floats:
 def estimate_function(
     adjust: Callable[[Floats], Residuals], terms: Floats, *, max_steps: int = 30
 ) -> FunctionEstimate:
-    """Estimate a variance function."""
     factors = np.ones(len(terms))
     state = adjust(factors)
     beta: Floats = np.zeros(terms.shape[1])

@@ -30,8 +30,6 @@ _LISTED = ("lines", "next", "outliers", "rivals", "hints")  # Members of a verdi
 
 @dataclass(frozen=True, repr=False)
 class Verdict:
-    """Whether a result can be used."""
-
     code: str  # Code of the first applicable rule; listed in `docs/command-line.md`
     message: Phrase  # Its message: a code with fields
     exit: int  # Exit code of the command: 0, 3 or 4
@@ -64,7 +62,6 @@ class Verdict:
 
     @property
     def usable(self) -> bool:
-        """Whether the result can be used."""
         return self.exit == 0
 
     def marks(self, kind: Text, shape: tuple[int, ...]) -> Bools:
@@ -100,8 +97,6 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Rule:
-    """A rule of verdicts."""
-
     code: str
     message: Callable[[Any], Phrase | None]  # Message on the evidence; None if the rule is not applicable
     exit: int  # Exit code, if `grave` applies to the evidence
@@ -160,7 +155,6 @@ def verdict(found: Findings) -> Verdict:
 
 
 def as_phrase(text: Text) -> Phrase:
-    """Return a message; convert a text without code."""
     return text if isinstance(text, Phrase) else Phrase("part.text", {"text": text})
 
 

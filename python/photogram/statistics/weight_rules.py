@@ -61,7 +61,6 @@ def wrong_types(types: Iterable[TypeFactor], odds: float) -> list[TypeFactor]:
 
 
 def needed(each: TypeFactor) -> Phrase:
-    """Return the factor of standard deviations that a type needs."""
     fields = {"kind": each.group, "factor": each.factor}
     sd = {} if math.isnan(each.sd) else {"sd": each.sd * each.factor, "unit": each.unit}
     return Phrase(f"part.type{'.sd' if sd else ''}", fields | sd)
@@ -93,7 +92,6 @@ def types_with_common_factor(e: Evidence) -> Phrase | None:
 
 
 def is_far(e: Evidence) -> bool:
-    """Whether the factor of standard deviations is implausibly large."""
     return e.factor > LARGEST_FACTOR
 
 

@@ -124,11 +124,8 @@ _ATTITUDE = 3
 def held_out(exposures: Sequence[Exposure], found: SkyCalibration, night: Night) -> tuple[Floats, Floats]:
     """Test each exposure, with adjusted attitudes, against the camera of the others.
 
-    Returns
-    -------
-    (E,) root mean squares of the residuals with that camera over the prediction from the others, NaN if these
-    do not determine the camera; (E,) probabilities of equal or larger sums of squares with the unit weight of
-    the others.
+    Return (E,) root mean squares of the residuals with that camera over the prediction from the others, NaN
+    if these do not determine the camera, and (E,) probabilities with the unit weight of the others.
     """
     factors, probabilities = np.full(len(exposures), np.nan), np.ones(len(exposures))
     sd = np.sqrt(np.diag(found.camera.covariance))
@@ -213,7 +210,6 @@ class LensTest:
 
     @property
     def needed(self) -> bool:
-        """Whether the parameters are significant and have a notable effect."""
         return self.significant and self.notable
 
     @property

@@ -215,8 +215,6 @@ def star_means(result: Result) -> Iterator[tuple[str, Floats, Floats, tuple[floa
 
 @dataclass(frozen=True, eq=False)
 class ComparatorFrame:
-    """Affinity of the plate coordinates along other axes."""
-
     angle: float  # From the axes of the plate coordinates to these, from x towards y; radians
     scale_x: float  # Principal distances along the axes over their mean
     scale_y: float

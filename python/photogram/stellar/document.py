@@ -244,7 +244,6 @@ def _residuals(result: Result) -> list[Fact]:
 
 
 def _prior(result: Result, name: str, weights: Floats, size: float, unit: str) -> Fact:
-    """Return the prior mean errors from a common weight."""
     if not len(weights) or not have_common_weight(weights):
         return Fact(name, "individual weights" if len(weights) else "-")
     return Fact.of(name, result.mean_error / np.sqrt(np.diag(weights[0])) / size, unit, decimals=4)

@@ -57,7 +57,6 @@ class Match:
 
     @property
     def doubtful(self) -> bool:
-        """Return whether a rejected identification may be correct."""
         return not self.accepted and self.expected <= DOUBTFUL
 
     def reason(self) -> Phrase:
@@ -164,7 +163,6 @@ def match(measured: Floats, predicted: Floats, search: Search, *, tolerance: flo
 
 
 def _mean_stars(density: float, tolerance: float) -> float:
-    """Return the mean number of stars in a tolerance area."""
     return density * math.pi * tolerance**2
 
 
@@ -398,12 +396,8 @@ def identify(
 
     The principal distance of the camera may have the relative error `stretch`. The tolerance is the largest
     distance of image and star after the best polynomials, pixels. `tried` is the number of earlier hypotheses
-    about this exposure.
-
-    Returns
-    -------
-    The match; (k,) index in the catalogue by the best hypothesis, accepted or not, -1 for none; alpha, omega,
-    kappa from these stars, the given ones if there are too few.
+    about this exposure. Return the match, (k,) indices in the catalogue by the best hypothesis, accepted or
+    not, -1 for none, and alpha, omega, kappa from these stars, the given ones if there are too few.
     """
     frame, catalogue, dut1, radius = night.frame, night.catalogue, night.earth.dut1, attitude_radius(night)
     if stretch > STRETCH:

@@ -24,8 +24,6 @@ from photogram.words import Phrase, phrase
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Solution of a run."""
-
     solution: str  # `minimum`, `maximum`, `refraction` or `combined`
     counts: Counts
     parameters: Floats  # (26,) values
@@ -82,7 +80,6 @@ class Solved:
 
     @property
     def iterations(self) -> int:
-        """Iterations after the initial values."""
         return len(self.levels) - 1
 
     @property
@@ -93,8 +90,6 @@ class Solved:
 
 @dataclass(frozen=True, eq=False)
 class PreRun:
-    """Images not used in the minimum solution (option 7)."""
-
     points: tuple[str, ...]
     stars: tuple[str, ...]
     residuals: Floats  # (m, 2) computed minus measured, metres
@@ -331,7 +326,6 @@ def iterate_as_published(
 
 
 def _correction(problem: Problem, core: _photocore.StellarProblem) -> dict[str, Any]:
-    """Return the correction at core values; raise errors with names."""
     try:
         return core.correction(**_tolerances(problem))
     except _photocore.StellarError as error:

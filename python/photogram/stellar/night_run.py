@@ -52,8 +52,6 @@ _NOTABLE_ERROR = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Used exposure."""
-
     index: int  # Index among the exposures of the night
     stars: Indices  # (k,) catalogue star of each image, -1 for none
     kept: Bools  # (k,) whether images are used
@@ -167,7 +165,6 @@ class Run:
         return replace(camera, values=values)
 
     def compare(self) -> None:
-        """Reject exposures inconsistent with the others, worst first."""
         while worst := self._worst():
             index, reason = worst
             self.rejected[index] = reason
@@ -327,8 +324,6 @@ _HOUR = math.tau / 24 * 1.00273790935  # Hourly rotation of the Earth relative t
 
 @dataclass(frozen=True, eq=False)
 class _Mistake:
-    """Possible mistake of the input, with its correction."""
-
     name: Phrase
     xy: Callable[[Floats, Floats], Floats] | None = None  # Of the images in a frame
     angles: Callable[[float, float, float], tuple[float, float, float]] | None = (

@@ -222,7 +222,6 @@ def _parameter_weights(table: TomlTree) -> Floats:
 
 
 def _table(table: TomlTree, *columns: str) -> ColumnTable:
-    """Return the file of a table, with required columns."""
     found = read_records(table["file"].named_file(), ragged=True)
     found.require(*columns)
     return found

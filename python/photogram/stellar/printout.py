@@ -25,7 +25,6 @@ WIDTH = 132
 
 
 def printout(result: Result) -> str:
-    """Return the pages of the problem and of the stars, separated by form feeds."""
     pages = [_problem(result), _coordinates(result)]
     return "\f".join("".join(f"{line[:WIDTH].rstrip()}\n" for line in page) for page in pages)
 

@@ -387,7 +387,6 @@ class Counts:
 
     @property
     def degrees_of_freedom(self) -> int:
-        """Observations and constraints minus unknowns."""
         return self.observations + self.constraints - self.unknowns
 
     @property

@@ -336,12 +336,10 @@ def histograms(result: Result) -> list[Table]:
 
 
 def degrees(angle: float) -> str:
-    """Write radians as degrees, minutes and seconds."""
     return _sexagesimal(angle, "d")
 
 
 def hours(angle: float) -> str:
-    """Write radians as hours, minutes and seconds of time."""
     return _sexagesimal(angle / 15, "h")
 
 

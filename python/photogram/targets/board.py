@@ -279,7 +279,6 @@ def is_board(path: Path) -> bool:
 
 
 def read_board(path: Path) -> Board:
-    """Read a `board.toml` or a Kalibr target."""
     return _of_toml(path) if path.suffix.lower() == ".toml" else _of_kalibr(path)
 
 

@@ -110,7 +110,6 @@ class Calibrated(Result):
 
     @cached_property
     def _housings(self) -> dict[int, Housing]:
-        """Housings that products have requested, by their first camera."""
         return {}
 
     @cached_property

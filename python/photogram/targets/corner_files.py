@@ -232,8 +232,6 @@ MAX_FILES_EXAMINED = 2000
 
 @dataclass(frozen=True)
 class Form:
-    """Corner file format: recognition and reading; `clear` if unambiguous."""
-
     title: str
     knows: Callable[[Path], bool]
     read: Callable[[Path, Board | None], Measured]

@@ -350,7 +350,6 @@ def appraise(
 
 
 def median_distance(calibrated: Calibrated, camera: int) -> float:
-    """Return the median distance of board centre and camera, rounded to two digits."""
     housing, own = housing_of(calibrated, camera)
     return float(f"{np.median(housing.board_distances(own)):.{DISTANCE_FIGURES}g}")
 

@@ -152,7 +152,6 @@ def _other_model(calibrated: Calibrated) -> list[Phrase]:
 
 
 def _systematic(cross: CrossValidation) -> Systematic:
-    """Return the rejected test of the split with the poorest agreement."""
     test = min((each[-1] for each in cross.tests), key=lambda each: each.probability)
     names = ", ".join(cross.cameras)
     return Systematic(

@@ -349,8 +349,6 @@ def _limit(misfit: Floats) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Pictures:
-    """P images with enough corners."""
-
     seen: Sightings  # Board observations in the images
     names: list[str]  # P names
     of_cameras: Indices  # (P,) camera of each image

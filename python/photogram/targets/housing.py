@@ -100,7 +100,6 @@ class Housing:
         return slice(end - 6 if camera else end, end)
 
     def noise_only(self) -> Housing:
-        """Return the housing with cofactors from corner errors only: Q - Q P Q."""
         to_common = self.cofactors[:, : self.common]
         return replace(self, cofactors=self.cofactors - to_common @ self.weights @ to_common.T)
 
@@ -132,7 +131,6 @@ class Housing:
 
 
 def middle_of(points: Floats) -> Floats:
-    """Return the centre (3,) of (n, 3) points of a board."""
     return np.asarray((points.max(axis=0) + points.min(axis=0)) / 2)
 
 

@@ -194,7 +194,6 @@ def _members(calibrated: Calibrated) -> dict[str, Any]:
 
 
 def worth_files(worth: Worth) -> dict[str, bytes]:
-    """Return the maps as named tables and arrays: `map-left-infinity.csv`."""
     files = {}
     for each in worth.maps:
         name = f"map-{map_name(each)}"

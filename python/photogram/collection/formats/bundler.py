@@ -55,7 +55,6 @@ class _Numbers:
         self.values = np.concatenate(parts)
 
     def take(self, count: int, what: str) -> Floats:
-        """Return the next numbers."""
         values = self.values[self.taken : self.taken + count]
         if len(values) < count:
             raise InputError(phrase("bundler.ends", n=count, subject=what), file=self.path)
@@ -68,7 +67,6 @@ class _Numbers:
 
 
 def begins(content: bytes) -> bool:
-    """Return whether unpacked content begins as a file of this format."""
     return HEADER.match(content) is not None
 
 

@@ -147,10 +147,76 @@ class Comparison(Documented, Judged):
 
     def document(self) -> Document:
         """Return the document with changes, control charts, grids and all values."""
-        return comparison_document(self)
+        together = self.together
+        given = {plate: grid.sigma_um or 0.0 for plate, grid in together.grids.items()}
+        grids = [
+            members(grid, "points", "sigma_um", "adopted", plate="number")
+            | {
+                "given_um": together.grids[plate].xy_um,
+                "corrections_um": together.corrections_um[plate],
+                "covariance_um2": together.covariance_um2[plate],
+                "usable": self.usable_grids,
+            }
+            for plate, grid in self.grids.items()
+        ]
+        pointing, plates = operators(self), []
+        for plate, grid in self.grids.items():
+            sd = np.sqrt(np.diag(together.covariance_um2[plate])).reshape(-1, 2)
+            plates.append(plate_points(grid, grid.points, together.corrections_um[plate], sd))
+        return history_document(
+            "Calibrations of comparators over years",
+            calibrations(self),
+            self.histories,
+            self.verdict,
+            "comparators",
+            {name: members(own, "centre_um", "half_range_um") for name, own in self.ranges.items()},
+            highlights=[
+                Fact.of(
+                    f"Grid {plate}, a coordinate",
+                    grid.sigma_um or 0.0,
+                    "µm",
+                    f"given {significant(given[plate], 3)} µm; {grid.adopted}",
+                    figures=3,
+                )
+                for plate, grid in self.grids.items()
+            ],
+            more=[
+                Section("grids", "Grids", plates, about("comparator.grids")),
+                Section("pointing", "Pointing of the operators, all calibrations", [pointing]),
+            ],
+            members={
+                "covariance": together.covariance,
+                "sigma0": together.test.factor,
+                "degrees_of_freedom": together.test.degrees_of_freedom,
+                "grids": grids,
+            },
+        )
 
     def _findings(self) -> Findings:
-        return comparison_findings(self)
+        places = [
+            (record.name, case.number, point, axis)
+            for record in self.calibrations
+            for case in record.cases
+            for point in case.points.tolist()
+            for axis in "xy"
+        ]
+        values = np.concatenate([own.ravel() for each in self.together.standardized for own in each])
+
+        def name(index: tuple[int, ...]) -> Phrase:
+            record, case, point, axis = places[index[0]]
+            return phrase("comparators.axis-of-record", axis=axis, point=point, case=case, record=record)
+
+        test = self.together.test
+        wrong = test.problem() is not None
+        return history_findings(
+            self.histories,
+            observations=[Tested(phrase("comparators.all-readings"), values, name, "w")],
+            degrees_of_freedom=test.degrees_of_freedom,
+            global_test=test,
+            spoiled=phrase("harmful.grids") if wrong else "",
+            if_usable=[phrase("advice.adjusted-grid")],
+            if_withheld=[phrase("advice.grids-withheld" if wrong else "advice.comparator-changed")],
+        )
 
 
 def compare(
@@ -318,77 +384,3 @@ def operators(comparison: Comparison) -> Table:
         Quantity(freedom, member="degrees_of_freedom", head="Degrees of freedom"),
     ]
     return Table("operators", "Operators", columns)
-
-
-def comparison_findings(comparison: Comparison) -> Findings:
-    places = [
-        (record.name, case.number, point, axis)
-        for record in comparison.calibrations
-        for case in record.cases
-        for point in case.points.tolist()
-        for axis in "xy"
-    ]
-    values = np.concatenate([own.ravel() for each in comparison.together.standardized for own in each])
-
-    def name(index: tuple[int, ...]) -> Phrase:
-        record, case, point, axis = places[index[0]]
-        return phrase("comparators.axis-of-record", axis=axis, point=point, case=case, record=record)
-
-    test = comparison.together.test
-    wrong = test.problem() is not None
-    return history_findings(
-        comparison.histories,
-        observations=[Tested(phrase("comparators.all-readings"), values, name, "w")],
-        degrees_of_freedom=test.degrees_of_freedom,
-        global_test=test,
-        spoiled=phrase("harmful.grids") if wrong else "",
-        if_usable=[phrase("advice.adjusted-grid")],
-        if_withheld=[phrase("advice.grids-withheld" if wrong else "advice.comparator-changed")],
-    )
-
-
-def comparison_document(comparison: Comparison) -> Document:
-    together = comparison.together
-    given = {plate: grid.sigma_um or 0.0 for plate, grid in together.grids.items()}
-    grids = [
-        members(grid, "points", "sigma_um", "adopted", plate="number")
-        | {
-            "given_um": together.grids[plate].xy_um,
-            "corrections_um": together.corrections_um[plate],
-            "covariance_um2": together.covariance_um2[plate],
-            "usable": comparison.usable_grids,
-        }
-        for plate, grid in comparison.grids.items()
-    ]
-    pointing, plates = operators(comparison), []
-    for plate, grid in comparison.grids.items():
-        sd = np.sqrt(np.diag(together.covariance_um2[plate])).reshape(-1, 2)
-        plates.append(plate_points(grid, grid.points, together.corrections_um[plate], sd))
-    return history_document(
-        "Calibrations of comparators over years",
-        calibrations(comparison),
-        comparison.histories,
-        comparison.verdict,
-        "comparators",
-        {name: members(own, "centre_um", "half_range_um") for name, own in comparison.ranges.items()},
-        highlights=[
-            Fact.of(
-                f"Grid {plate}, a coordinate",
-                grid.sigma_um or 0.0,
-                "µm",
-                f"given {significant(given[plate], 3)} µm; {grid.adopted}",
-                figures=3,
-            )
-            for plate, grid in comparison.grids.items()
-        ],
-        more=[
-            Section("grids", "Grids", plates, about("comparator.grids")),
-            Section("pointing", "Pointing of the operators, all calibrations", [pointing]),
-        ],
-        members={
-            "covariance": together.covariance,
-            "sigma0": together.test.factor,
-            "degrees_of_freedom": together.test.degrees_of_freedom,
-            "grids": grids,
-        },
-    )
