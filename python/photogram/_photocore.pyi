@@ -2684,8 +2684,10 @@ class TableReader:
         empty or NaN, and that all differ by more than blanks and case.
         """
 
-def csv_rows(columns: Sequence[_Floats | _Indices | NDArray[np.bool_] | list[str | None]]) -> bytes:
-    """Return the rows of a table as comma-separated text (UTF-8), one line each.
+def csv_rows(
+    head: bytes, columns: Sequence[_Floats | _Indices | NDArray[np.bool_] | list[str | None]]
+) -> bytes:
+    """Return a head and the rows of a table as comma-separated text (UTF-8), one line each.
 
     Numbers have the shortest digits that are read back exactly. NaN and None are empty cells, Booleans are
     `true` and `false`. Texts with commas, semicolons, bars, tabs, hashes, quotation marks, line ends or
@@ -2693,6 +2695,8 @@ def csv_rows(columns: Sequence[_Floats | _Indices | NDArray[np.bool_] | list[str
 
     Parameters
     ----------
+    head
+        Lines before the rows.
     columns
         Columns of equal length.
 
