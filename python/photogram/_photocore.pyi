@@ -1414,6 +1414,7 @@ class NetworkTrial:
         compared: int = 0,
         by_component: bool = False,
         photos: list[int] = ...,
+        last: bool = False,
     ) -> dict[str, Any]:
         """Test errors that sets of observations have in common, and errors of groups except images.
 
@@ -1449,6 +1450,8 @@ class NetworkTrial:
             Whether check points also test errors of each component of groups.
         photos
             Photos that are tested for a shift of all their image observations; by default none.
+        last
+            Whether the trial ends: the data for tests of a large network are released.
 
         Returns
         -------
