@@ -1414,6 +1414,7 @@ class NetworkTrial:
         compared: int = 0,
         by_component: bool = False,
         photos: list[int] = ...,
+        last: bool = False,
     ) -> dict[str, Any]:
         """Test errors that sets of observations have in common, and errors of groups except images.
 
@@ -1449,6 +1450,8 @@ class NetworkTrial:
             Whether check points also test errors of each component of groups.
         photos
             Photos that are tested for a shift of all their image observations; by default none.
+        last
+            Whether the trial ends: the data for tests of a large network are released.
 
         Returns
         -------
@@ -2684,8 +2687,10 @@ class TableReader:
         empty or NaN, and that all differ by more than blanks and case.
         """
 
-def csv_rows(columns: Sequence[_Floats | _Indices | NDArray[np.bool_] | list[str | None]]) -> bytes:
-    """Return the rows of a table as comma-separated text (UTF-8), one line each.
+def csv_rows(
+    head: bytes, columns: Sequence[_Floats | _Indices | NDArray[np.bool_] | list[str | None]]
+) -> bytes:
+    """Return a head and the rows of a table as comma-separated text (UTF-8), one line each.
 
     Numbers have the shortest digits that are read back exactly. NaN and None are empty cells, Booleans are
     `true` and `false`. Texts with commas, semicolons, bars, tabs, hashes, quotation marks, line ends or
@@ -2693,6 +2698,8 @@ def csv_rows(columns: Sequence[_Floats | _Indices | NDArray[np.bool_] | list[str
 
     Parameters
     ----------
+    head
+        Lines before the rows.
     columns
         Columns of equal length.
 

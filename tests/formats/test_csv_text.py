@@ -63,7 +63,7 @@ def test_many_rows_keep_their_order():
 
 def test_columns_that_differ_in_length_are_refused():
     with pytest.raises(ValueError, match="differ in length"):
-        _photocore.csv_rows([np.zeros(2), np.zeros(3)])
+        _photocore.csv_rows(b"", [np.zeros(2), np.zeros(3)])
 
 
 def test_no_rows():

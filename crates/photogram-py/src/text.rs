@@ -128,7 +128,7 @@ fn write_text(text: &str, to: &mut Vec<u8>) -> io::Result<()> {
 }
 
 #[pyfunction]
-pub fn csv_rows<'py>(py: Python<'py>, columns: Vec<Column>) -> PyResult<Bound<'py, PyBytes>> {
+pub fn csv_rows<'py>(py: Python<'py>, head: &[u8], columns: Vec<Column>) -> PyResult<Bound<'py, PyBytes>> {
     let rows = columns.first().map_or(0, Column::len);
     if columns.iter().any(|column| column.len() != rows) {
         return Err(PyValueError::new_err("columns differ in length"));
@@ -152,8 +152,9 @@ pub fn csv_rows<'py>(py: Python<'py>, columns: Vec<Column>) -> PyResult<Bound<'p
         let parts = context.threads.install(|| firsts.par_iter().map(|&first| stretch(first)).collect());
         Ok::<Vec<Vec<u8>>, Infallible>(parts)
     })?;
-    PyBytes::new_with(py, parts.iter().map(Vec::len).sum(), |to| {
-        let mut at = 0;
+    PyBytes::new_with(py, head.len() + parts.iter().map(Vec::len).sum::<usize>(), |to| {
+        let mut at = head.len();
+        to[..at].copy_from_slice(head);
         for part in parts {
             to[at..at + part.len()].copy_from_slice(&part);
             at += part.len();

@@ -20,7 +20,7 @@ const THREADS_EACH: usize = 4;
 /// Number of observed points up to which work remains on the calling thread, if the number of threads is not specified. Such work needs
 /// some milliseconds, as much as the start of threads.
 const SMALL: usize = 5000;
-/// Number of local blocks from which memory of the solution phase is returned to the system before the inversion.
+/// Number of local blocks from which memory is returned to the system before the inversion and at the end.
 const MANY: usize = 200_000;
 
 /// Threads of a computation.
@@ -86,11 +86,12 @@ fn supervise(
 ) -> PyResult<()> {
     let failures = memory::arm()?;
     let mut raised = None;
-    let (mut last, mut inverts) = (Instant::now(), false);
+    let (mut last, mut inverts, mut is_large) = (Instant::now(), false, false);
     let mut report = |event: Event| {
         if failures.more() {
             return ControlFlow::Break(());
         }
+        is_large |= matches!(event, Event::Progress { total: MANY.., .. });
         let inverted = matches!(event, Event::Progress { phase: Phase::Invert, total: MANY.., .. });
         if inverted && !std::mem::replace(&mut inverts, inverted) {
             memory::give_back();
@@ -128,6 +129,9 @@ fn supervise(
             done
         })
     };
+    if is_large {
+        memory::give_back();
+    }
     let succeeded = done.ok_or_else(memory::no_buffers)?;
     match raised {
         Some(error) => Err(error),

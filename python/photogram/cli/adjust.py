@@ -102,6 +102,7 @@ def adjust(
             given: dict[str, Any] = {"crs": documents.crs, "strict": strict}
             own = stated(job, result, asked, assumed=project.lacks, **given)
     subject = removed or result
+    code = result.verdict.exit_code(strict=strict)  # Releases the factor before the files are made
     in_crs, more = _in_system(result, documents.crs, project.control_crs)
     files, remarks = project_files(project, result)
     for refusal in remarks:
@@ -109,7 +110,6 @@ def adjust(
     files |= in_crs
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()
-    code = result.verdict.exit_code(strict=strict)
     document = subject.document().with_sections(*more)
     documents.conclude(
         job,

@@ -26,7 +26,7 @@ from photogram.formats.xml_stream import SUFFIXES, read_stream, root_of
 from photogram.io.files import reading
 from photogram.io.places import Place, at_place, one_word
 from photogram.lazy_dataclasses import dataclass
-from photogram.memory import turned
+from photogram.memory import give_back, turned
 from photogram.results.result import Result
 from photogram.words import phrase
 
@@ -34,6 +34,7 @@ _TO_WRITE: Mapping[str, Format] = ChainMap(FORMATS_OF_CAMERAS, FORMATS)  # The o
 SD = ("images", "control", "check", "gnss")
 """Types of data of any format to which the user may add standard deviations."""
 MOST = 200  # Largest number of files that are examined in a folder without format
+LARGE = 1_000_000  # Image observations from which memory of the reading is returned to the system
 
 
 def recognised(path: Path) -> Format:
@@ -107,6 +108,8 @@ def read(path: Path, options: ReadOptions | None = None, **changes: Any) -> Proj
                 project = with_photo_positions(project, options)
             planes = plane_remarks(project.block, path, project.starts)
             project = project.replace(messages=(*project.messages, *planes))
+            if len(project.block.image_xy) > LARGE:
+                give_back()
         except PhotogramError:
             raise
         except (ArithmeticError, LookupError, ValueError) as error:

@@ -16,8 +16,9 @@ _ARRAYS = {"f": np.float64, "i": np.int64, "u": np.int64, "b": np.bool_}  # By t
 def csv_text(columns: Mapping[str, Sequence[Any] | Any], comments: Sequence[str] = ()) -> bytes:
     """Return a table as CSV with comments; empty cells for NaN and None."""
     head = [*(f"# {each}" for each in comments), ",".join(columns)]
-    rows = _photocore.csv_rows([_column(column) for column in columns.values()])
-    return ("\n".join(head) + "\n").encode() + rows
+    return _photocore.csv_rows(
+        ("\n".join(head) + "\n").encode(), [_column(column) for column in columns.values()]
+    )
 
 
 def _column(column: Any) -> Any:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -25,7 +26,7 @@ from photogram.results.network_trial import (
     Tests,
 )
 from photogram.results.reliability import Reliability, downweighted
-from photogram.results.reliability_summary import ReliabilitySummary, listed
+from photogram.results.reliability_summary import Listed, ReliabilitySummary, listed
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import LARGEST_FACTOR, NOMINAL, Text, TypeFactor
 from photogram.statistics.limits import global_test
@@ -47,11 +48,12 @@ def reliability_summary(result: AdjustedNetwork) -> ReliabilitySummary | None:
         return None
     refused = LostSupportError, _photocore.BlockError, _photocore.CollectionError
     facts, weight = result._hypothesis_facts(), "known" if result.known_weight else "unknown"
-    found = errors = lost = None
+    found = errors = lost = list_groups = None
     # Other results remain valid; a network that is singular by rounding has a message already.
     with suppress(*refused):
         found = result.reliability(unit_weight=weight)
     if found is not None:
+        list_groups = lists(result, found)
         errors, lost = evaluated(result, found, facts), found.downweighted
     elif result.loss is not None:
         lost = downweighted(result._trial(), result._terms, result.image_weights, result.used_images)
@@ -63,22 +65,37 @@ def reliability_summary(result: AdjustedNetwork) -> ReliabilitySummary | None:
             level, power = DETECTION
             options: dict[str, Any] = {"level": level, "power": power, "unit_weight": weight}
             whole = Reliability(trial, result.covariances, lost, **options)
+            list_groups = list_groups or lists(result, whole)
             # Check points were compared with the robust solution.
             of_whole = evaluated(result, whole, facts | {"agreement": None})
             if of_whole[0].common() or wrong_types(of_whole[1], of_whole[0].odds()):
                 found, errors = found or whole, of_whole
-    if found is None or errors is None:
+    if found is None or errors is None or list_groups is None:
         return None
     summary = ReliabilitySummary(
         **{name: getattr(found, name) for name in _SHARED},
-        # Plan coordinates may be angles.
-        list_groups=partial(listed, found, result._terms.linear_unit, heights=result.geographic),
+        list_groups=list_groups,
         hypotheses=errors[0],
         types=tuple(errors[1]),
     )
-    if len(found.suspects) > MOST_WAITING:
+    if is_large(found):
         summary.listed  # noqa: B018
     return summary
+
+
+def is_large(found: Reliability) -> bool:
+    """Return whether the trial of a network ends with its hypotheses."""
+    return len(found.suspects) > MOST_WAITING
+
+
+def lists(result: AdjustedNetwork, found: Reliability) -> Callable[[], Listed]:
+    """Return a function that lists groups for reports; of a large network they are listed now."""
+    # Plan coordinates may be angles.
+    list_groups = partial(listed, found, result._terms.linear_unit, heights=result.geographic)
+    if not is_large(found):
+        return list_groups
+    done = list_groups()
+    return lambda: done
 
 
 def evaluated(
@@ -89,7 +106,7 @@ def evaluated(
     standing = found.standing.sum_and_freedom if known else result.sum_and_freedom
     types = type_factors(found.trial, found.tests, limit, standing) if known else []
     parts = found.trial, found.tests, facts, result._terms.point_axes, standing, limit
-    return hypotheses(*parts, known=known), types
+    return hypotheses(*parts, known=known, last=is_large(found)), types
 
 
 MOST_ROWS = 64  # Largest number of observations with an exact sum of R_ij^2

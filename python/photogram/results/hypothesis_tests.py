@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from photogram.arguments.arrays import sampled
 from photogram.arguments.types import Floats, Indices
+from photogram.memory import give_back
 from photogram.results.hypotheses import DETECTION, SHARES, WHOLE, Effect, Hypotheses
 from photogram.results.network_trial import (
     IMAGE,
@@ -42,12 +43,13 @@ def hypotheses(
     limit: float,
     *,
     known: bool,
+    last: bool = False,
 ) -> Hypotheses:
     """Return the hypotheses of an adjusted network with the `tests` of its observations.
 
     `axes` are those of its points, `standing` the sum of squares and the degrees of freedom, `known` is
     whether the unit weight is known. `limit`: standard deviations from which on an undetected error of a
-    point counts.
+    point counts. `last`: whether the trial may be released.
     """
     suspects, estimated = trial.suspects, None if known else standing
     images = (suspects.kinds == 0) & tests.active
@@ -69,9 +71,14 @@ def hypotheses(
             )
     if core["widths"]:
         core["photos"] = shifted_photos(suspects, tests)
+    if last:
+        trial.restart(trial.core)
+        give_back()
     found = trial.core.hypotheses(
-        **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS
+        **core, estimated=estimated, detection=DETECTION, limit=limit, effects=EFFECTS, last=last
     )
+    if last:
+        give_back()
     if strips is not None:
         of_strips = np.isin(found["code"], ("gnss-set", "camera-f-strip"))
         found["index"][of_strips] = np.array(strips)[found["index"][of_strips]]

@@ -7,7 +7,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 use pulp::{Arch, Simd, WithSimd};
 
 use super::equations::{EquationOf, ObservationEquations, Row};
@@ -439,8 +439,9 @@ impl Linearized {
         let together = count.div_ceil(count.div_ceil(SOLVED).next_multiple_of(2).max(1));
         let some = columns.as_slice().chunks((columns.nrows() * together).max(1)).collect();
         let solve = |rights: &[f64]| self.factor.solve_reduced(rights);
-        let solved = threads.install(|| parallel::map_each(some, &solve)).concat();
-        let effects = DMatrix::from_vec(columns.nrows(), count, solved);
+        let (solved, height) = (threads.install(|| parallel::map_each(some, &solve)), columns.nrows());
+        drop(columns);
+        let effects = DMatrix::from_vec(height, count, solved.concat());
         entries += rights * &effects;
         let redundancy = &squares - (&entries + entries.transpose()) / 2.0;
         Additional { score, squares, redundancy, effects, observations }
@@ -454,7 +455,7 @@ impl Linearized {
         &self,
         problem: &AnyProblem<'_>,
         parameters: &dyn AdditionalParameters,
-        (effects, errors): (&DMatrix<f64>, &DMatrix<f64>),
+        (effects, errors): (DMatrixView<'_, f64>, &DMatrix<f64>),
         locals: &[usize],
         threads: &Threads,
     ) -> Vec<DMatrix<f64>> {

@@ -15,7 +15,7 @@ use super::result::{AdjustError, Adjustment};
 use super::walk::Buffers;
 use crate::normals::{
     Cofactors, Equations, FactorOptions, Function, InvertOptions, Layout, LayoutError, RowCofactors,
-    SelectedInverse,
+    SelectedInverse, System,
 };
 use crate::{Context, Threads, parallel};
 use faer::Mat;
@@ -29,7 +29,7 @@ pub struct Leverages {
     pub held: Vec<usize>,
     /// Residuals (observed minus computed), including excluded observations, in the units of the observations.
     pub residuals: Vec<f64>,
-    /// Cofactors, including leverage matrices of groups.
+    /// Cofactors, including leverage matrices of groups; those of single equations are their diagonals and not stored again.
     pub cofactors: Cofactors,
     selected: SelectedInverse,
     linearized: Option<Linearized>,
@@ -38,7 +38,8 @@ pub struct Leverages {
 impl Leverages {
     /// Moves the data that [`super::Requests::by_groups`] requests out of an adjustment, at its final values; None if it did not store them.
     pub fn of(adjustment: &mut Adjustment, values: &[f64]) -> Option<Self> {
-        let (selected, cofactors) = (adjustment.selected.take()?, adjustment.cofactors.take()?);
+        let (selected, mut cofactors) = (adjustment.selected.take()?, adjustment.cofactors.take()?);
+        cofactors.equations = vec![];
         let residuals = std::mem::take(&mut adjustment.residuals);
         let values = values.to_vec();
         let held = adjustment.datum.clone();
@@ -64,7 +65,8 @@ impl Leverages {
         let factor = formed.small_factor(context.threads);
         let inverting = InvertOptions { by_groups: true, ..InvertOptions::default() };
         let found = formed.invert(&equations, &inverting, context)?;
-        let Inverted { values, held, cofactors, selected, .. } = found;
+        let Inverted { values, held, mut cofactors, selected, .. } = found;
+        cofactors.equations = vec![];
         let residuals = problem.residuals(context.threads, &values);
         let linearized = factor.map(|factor| Linearized::of_factor(factor, values.clone(), held.clone()));
         Ok(Self { values, held, residuals, cofactors, selected, linearized })
@@ -84,6 +86,12 @@ impl Leverages {
         }
         let (values, held) = (self.values.clone(), self.held.clone());
         Ok(Cow::Owned(Linearized::form(problem, None, values, held, &mut Context::new(threads))?))
+    }
+
+    /// Releases the residuals, the leverage matrices of groups and the inverse, whose memory the next factor takes over.
+    pub fn release(&mut self, system: &System) {
+        (self.residuals, self.cofactors.groups) = (vec![], None);
+        system.reuse(&mut self.selected);
     }
 
     /// Weighted sum of squares of the included observations.

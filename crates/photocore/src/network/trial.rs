@@ -317,6 +317,13 @@ impl Trial {
         self.found.as_ref().ok_or(NetworkError::State)
     }
 
+    /// Returns the adjusted network without the data for tests, of which the trial has none afterwards.
+    pub(super) fn end(&mut self) -> Option<Leverages> {
+        let mut found = self.found.take()?;
+        found.release(&self.assembled.problem.system);
+        Some(found)
+    }
+
     /// Returns the prior terms of the parameters, with given standard deviations.
     pub(super) fn prior_terms(&self, sd: &[f64], values: &[f64]) -> PriorTerms {
         let problem = &self.assembled.problem;

@@ -68,6 +68,11 @@ impl Factor {
 }
 
 impl System {
+    /// Takes over the memory of an inverse for the next factor; the inverse is empty afterwards.
+    pub fn reuse(&self, inverse: &mut SelectedInverse) {
+        self.workspace.put_back_panels(std::mem::take(&mut inverse.panels.values));
+    }
+
     /// Converts the initial diagonal of the normal equations from elimination order to the order of the retained blocks in the layout.
     fn information(&self, diagonal: &[f64]) -> Vec<f64> {
         let retained = self.layout.all_retained();

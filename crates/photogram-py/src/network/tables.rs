@@ -52,11 +52,15 @@ impl SolutionColumns {
             standardized: vec![],
             image_weights: vec![],
         };
+        // The results of images are released before the columns of points are allocated.
         rayon::scope(|scope| {
             fill(scope, &mut columns.residuals, &images, two, |image| image.residual);
             fill(scope, &mut columns.redundancy, &images, two, |image| image.redundancy);
             fill(scope, &mut columns.standardized, &images, two, |image| image.standardized);
             fill(scope, &mut columns.image_weights, &images, f64::NAN, |image| image.weight);
+        });
+        drop(images);
+        rayon::scope(|scope| {
             fill(scope, &mut columns.point_cofactors, &points, [three; 3], |point| point.cofactors.data.0);
             fill(scope, &mut columns.point_positions, &points, three, |point| point.coordinates);
             fill(scope, &mut columns.point_redundancy, &points, three, |point| point.redundancy);

@@ -217,10 +217,10 @@ impl NetworkTrial {
         Ok(all)
     }
 
-    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects, observed=None, compared=0, by_component=false, photos=vec![]))]
+    #[pyo3(signature = (*, velocities, times, position_sets, control_sets, readouts, widths, checks, centre, estimated, detection, limit, effects, observed=None, compared=0, by_component=false, photos=vec![], last=false))]
     #[allow(clippy::too_many_arguments, reason = "one for each fact")]
     fn hypotheses<'py>(
-        &self,
+        &mut self,
         py: Python<'py>,
         velocities: Array<'_>,
         times: Vec<f64>,
@@ -238,6 +238,7 @@ impl NetworkTrial {
         compared: usize,
         by_component: bool,
         photos: Vec<usize>,
+        last: bool,
     ) -> PyResult<Bound<'py, PyDict>> {
         let velocities = rows("velocities", &velocities)?;
         let observed = observed.map_or_else(|| Ok(vec![]), |own| rows("observed", &own))?;
@@ -258,8 +259,10 @@ impl NetworkTrial {
             detection,
             limit,
             effects,
+            last,
         };
-        hypothesis_columns(py, self.query(py, |trial, pool| trial.hypotheses(&facts, pool))?)
+        let found = self.run(py, None, |own| own.trial.hypotheses(&facts, own.context.threads))?;
+        hypothesis_columns(py, found)
     }
 
     fn effects<'py>(&self, py: Python<'py>, suspects: Vec<usize>) -> PyResult<Matrix<'py>> {

@@ -89,8 +89,13 @@ impl<'a> Sample<'a> {
         let errors = DMatrix::from_columns(errors);
         let others = effects * &errors;
         let problem = &self.trial.assembled.problem;
-        let locals =
-            self.linearized.changes_of_locals(problem, parameters, (&others, &errors), &self.locals, threads);
+        let locals = self.linearized.changes_of_locals(
+            problem,
+            parameters,
+            (others.as_view(), &errors),
+            &self.locals,
+            threads,
+        );
         Changes { locals, others }
     }
 
@@ -106,7 +111,7 @@ impl<'a> Sample<'a> {
         let checks = &self.checks[..self.facts.compared.min(self.checks.len())];
         let mut found = DMatrix::from_element(3 * checks.len(), count, f64::NAN);
         let (errors, first) = (DMatrix::identity(effects.ncols(), count), self.locals.len());
-        let others = effects.columns(0, count).into_owned();
+        let others = effects.columns(0, count);
         let model = &self.trial.assembled.problem.model;
         let mut locals = vec![];
         for (check, index) in checks.iter().enumerate().filter_map(|(check, at)| Some((check, (*at)?))) {
@@ -120,7 +125,7 @@ impl<'a> Sample<'a> {
         }
         let (rows, places): (Vec<usize>, Vec<usize>) = locals.into_iter().unzip();
         let problem = &self.trial.assembled.problem;
-        let parts = (&others, &errors);
+        let parts = (others, &errors);
         let changes = self.linearized.changes_of_locals(problem, parameters, parts, &places, threads);
         rows.iter().zip(changes).for_each(|(&row, own)| found.rows_mut(row, 3).copy_from(&own.rows(0, 3)));
         found

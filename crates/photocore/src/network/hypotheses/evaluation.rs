@@ -47,16 +47,22 @@ impl Trial {
     ///
     /// # Errors
     /// Nothing was adjusted before; an interruption, no memory.
-    pub fn hypotheses(&self, facts: &Facts, threads: &Threads) -> Result<Hypotheses, NetworkError> {
-        let (found, problem) = (self.found()?, &self.assembled.problem);
-        let failed = |error| NetworkError::new(error, &self.assembled);
-        let linearized = found.linearized(problem, threads).map_err(failed)?;
+    pub fn hypotheses(&mut self, facts: &Facts, threads: &Threads) -> Result<Hypotheses, NetworkError> {
+        self.found()?;
         let criteria = Criteria::new(facts);
-        let sample = Sample::new(self, found, &linearized, facts);
         let mut singles = single_errors(self, &criteria, threads);
         let worst = worst(&singles, facts);
+        let ended = if facts.last { self.end() } else { None };
 
-        let mut catalogue = catalogue(self, found, facts);
+        let (this, problem) = (&*self, &self.assembled.problem);
+        let found = ended.as_ref().map_or_else(|| this.found(), Ok)?;
+        let failed = |error| NetworkError::new(error, &this.assembled);
+        let linearized = found.linearized(problem, threads).map_err(failed)?;
+        if facts.last {
+            problem.system.release();
+        }
+        let sample = Sample::new(this, found, &linearized, facts);
+        let mut catalogue = catalogue(this, found, facts);
         let mut add = |&k: &usize| singles[k].add(&mut catalogue, facts.by_component);
         let shares: Vec<Vec<(usize, f64)>> = worst.iter().map(&mut add).collect();
         let sums = linearized.additional(problem, &catalogue, threads);
@@ -102,7 +108,7 @@ impl Trial {
             columns.push(own);
         }
         let sets = all.len();
-        let parts = (self, found, &*linearized, &catalogue);
+        let parts = (this, found, &*linearized, &catalogue);
         shutter::add_sd_between_photos(parts, &sums.effects, &mut all, threads);
         for (&k, own) in worst.iter().zip(&shares) {
             let mut error = DVector::zeros(count);
@@ -113,10 +119,10 @@ impl Trial {
             }
         }
         let changes = sample.changes(&catalogue, &sums.effects, &errors, threads);
-        let control: Vec<usize> = catalogue.control_points(self).into_iter().map(|own| own.0).collect();
+        let control: Vec<usize> = catalogue.control_points(this).into_iter().map(|own| own.0).collect();
         let effect = |error: usize| {
             let mut own = match error.checked_sub(sets) {
-                Some(k) => self.points_of(singles[worst[k]].group),
+                Some(k) => this.points_of(singles[worst[k]].group),
                 // The scale is that of control and positions.
                 None if all[error].code.starts_with("control") || all[error].code == "scale" => {
                     control.clone()

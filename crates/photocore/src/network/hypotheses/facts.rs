@@ -37,4 +37,6 @@ pub struct Facts {
     pub limit: f64,
     /// Number of groups whose effects are computed: those of the largest bias-to-noise ratios.
     pub effects: usize,
+    /// Whether the trial ends: the data for tests are released before the normal equations of a large network are factored.
+    pub last: bool,
 }
