@@ -29,7 +29,7 @@ from photogram.diagnosis.tested_values import (
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
-from photogram.network.subset import kept_images, of_photos
+from photogram.network.motion import kept_images, of_photos
 from photogram.results.result import Result
 from photogram.results.snooping_log import Aside, Exchange
 from photogram.results.snooping_options import SnoopOptions

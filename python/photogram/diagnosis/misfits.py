@@ -15,8 +15,7 @@ from photogram.diagnosis.tested_values import FOUND, SURE, sizes_of_tests, sprea
 from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block, flown_by
-from photogram.network.directions import seen_without_lenses
-from photogram.network.rays import Rays, meet
+from photogram.network.rays import Rays, meet, seen_without_lenses
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, OBSERVATION, POSITION, BlockSuspects
 from photogram.results.result import Result
 from photogram.results.snooping_log import Exchange, Removal

@@ -18,7 +18,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.diagnosis.regression import view
 from photogram.errors import AdjustmentError, InputError
 from photogram.network.block import Block
-from photogram.network.subset import kept_images, of_photos
+from photogram.network.motion import kept_images, of_photos
 from photogram.results.findings import HARMFUL
 from photogram.results.result import Result
 from photogram.results.snooping_log import Exchange

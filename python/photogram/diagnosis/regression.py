@@ -11,8 +11,8 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
+from photogram.network.motion import kept_images
 from photogram.network.rays import Rays
-from photogram.network.subset import kept_images
 
 LEAST = 6  # Known or intersected points that a photo needs
 MOST = 12  # Maximum number of examined photos,

@@ -9,8 +9,8 @@ import numpy as np
 from photogram.diagnosis.mistakes import Change
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
-from photogram.network.directions import seen_without_lenses
-from photogram.network.subset import kept_images
+from photogram.network.motion import kept_images
+from photogram.network.rays import seen_without_lenses
 
 
 @dataclass(frozen=True, eq=False)

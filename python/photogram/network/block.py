@@ -27,13 +27,21 @@ from photogram.arguments.types import (
 )
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import converting_dataclass, field, fields
-from photogram.network.block_checks import check_block, known_poses, unsupported
+from photogram.network.block_checks import (
+    GEOGRAPHIC_COLUMNS,
+    RECTANGULAR_COLUMNS,
+    Table,
+    check_block,
+    known_poses,
+    table_arguments,
+    unsupported,
+)
 from photogram.network.cameras import Camera, CameraRow, camera_rows
 from photogram.network.films import reads_pixels
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.knots import Knots
-from photogram.network.moving_photos import Timed
+from photogram.network.moving_photos import Mount, Timed
 from photogram.network.observations import (
     Observation,
     Observations,
@@ -44,13 +52,6 @@ from photogram.network.observations import (
 from photogram.network.observations.columns import Group
 from photogram.network.passages import Passage
 from photogram.network.refraction import Refraction
-from photogram.network.rigs import Mount
-from photogram.network.tables import (
-    GEOGRAPHIC_COLUMNS,
-    RECTANGULAR_COLUMNS,
-    Table,
-    table_arguments,
-)
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
 from photogram.summaries import Brief, Rows, few

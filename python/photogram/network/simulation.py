@@ -17,10 +17,11 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import counted
 from photogram.network import geometry
 from photogram.network.block import Block
+from photogram.network.block_checks import checked_cameras
 from photogram.network.geometry import Spheroid
 from photogram.network.motion import given_poses
 from photogram.network.refraction import Refraction
-from photogram.network.simulated_images import photograph, photographed, seen_side
+from photogram.network.simulated_images import photograph, photographed, rolled, seen_side
 from photogram.network.simulated_layout import (
     control_pattern,
     flight,
@@ -29,9 +30,7 @@ from photogram.network.simulated_layout import (
     laid_out,
     point_ids,
 )
-from photogram.network.simulated_motion import rolled
 from photogram.network.simulation_options import LONGEST, LineScanner, RollingShutter, SimulationOptions
-from photogram.network.tables import checked_cameras
 from photogram.network.trajectories import Readout
 from photogram.words import phrase
 

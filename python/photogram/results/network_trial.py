@@ -15,8 +15,8 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
 from photogram.network.motion import on_shared
+from photogram.network.point_sets import strips_of
 from photogram.network.rays import local_axes
-from photogram.network.strips import strips_of
 from photogram.network.unadjusted import Given
 from photogram.results.parts import kind_words, named_observation
 from photogram.statistics.findings import Text

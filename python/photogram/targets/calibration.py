@@ -20,8 +20,8 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
+from photogram.network.moving_photos import Mount
 from photogram.network.passages import Bend, Figure
-from photogram.network.rigs import Mount
 from photogram.network.unknowns import Sensor
 from photogram.results.result import Result
 from photogram.results.snooping_options import SnoopOptions

@@ -17,7 +17,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
-from photogram.network.hull import hull, outside
+from photogram.network.point_sets import hull, outside
 from photogram.statistics.distributions import log_chi_square, log_fisher
 from photogram.summaries import Brief, Rows
 from photogram.targets.housing import (
