@@ -18,8 +18,8 @@ from photogram.lazy_dataclasses import converting_dataclass, field, replace
 from photogram.network.block import span
 from photogram.network.block_checks import numbered
 from photogram.network.cameras import camera_facts
-from photogram.network.knots import KNOTTED
 from photogram.network.observations import Observation, Observations
+from photogram.network.passages import KNOTTED
 from photogram.summaries import Brief, Rows
 from photogram.words import phrase
 

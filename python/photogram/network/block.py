@@ -40,7 +40,6 @@ from photogram.network.cameras import Camera, CameraRow, camera_rows
 from photogram.network.films import reads_pixels
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
-from photogram.network.knots import Knots
 from photogram.network.moving_photos import Mount, Timed
 from photogram.network.observations import (
     Observation,
@@ -50,7 +49,7 @@ from photogram.network.observations import (
     of_records,
 )
 from photogram.network.observations.columns import Group
-from photogram.network.passages import Passage
+from photogram.network.passages import Knots, Passage
 from photogram.network.refraction import Refraction
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
@@ -245,12 +244,10 @@ class Block(Valued, Brief):
 
     @cached_property
     def _photo_rows(self) -> dict[str, int]:
-        """Row of each photo by name."""
         return {name: row for row, name in enumerate(self.photo_ids)}
 
     @cached_property
     def _point_rows(self) -> dict[str, int]:
-        """Row of each point by name."""
         return {name: row for row, name in enumerate(self.point_ids)}
 
     @cached_property
@@ -454,7 +451,6 @@ def of_images_alone(block: Block, what: str) -> Block:
 
 
 def refuse_trajectories(block: Block, what: str) -> None:
-    """Reject a block with photos or observations on trajectories."""
     if moving := flown_by(block):
         raise unsupported(what, "trajectories", reason=moving)
 
@@ -475,11 +471,9 @@ def checked(block: Block) -> Block:
 
 
 def require_block(block: object) -> None:
-    """Reject an argument that is not a block."""
     if not isinstance(block, Block):
         raise kind_error("block", "a Block", block)
 
 
 def position_columns(block: Block) -> tuple[str, str, str]:
-    """Return the names of the three columns of positions in tables."""
     return GEOGRAPHIC_COLUMNS if block.geographic else RECTANGULAR_COLUMNS

@@ -107,7 +107,6 @@ def table_arguments(
 
 
 def different(name: str, values: Sequence[str]) -> list[str]:
-    """Return validated names; reject repeated ones."""
     checked = names(name, values)
     if len(set(checked)) != len(checked):
         seen: set[str] = set()
@@ -168,11 +167,10 @@ def _columns(
 
 def _distances(photos: Table, principal_distance: float | None, cameras: Sequence[Camera]) -> Floats | None:
     name = "principal_distance_mm"
+    given = name in photos or principal_distance is not None
     if cameras:
-        given = name in photos or principal_distance is not None
         require(not given, "photos", "exclusive", first="principal_distance", second="cameras")
         return None
-    given = name in photos or principal_distance is not None
     require(
         given, "photos", "requires", name="a block without cameras", other=f"principal_distance or {name}"
     )
@@ -197,7 +195,6 @@ def _lookup(kind: str, ids: Sequence[str], images: Sequence[str]) -> Indices:
 
 
 def checked_cameras(cameras: object) -> tuple[Camera, ...]:
-    """Return validated cameras with unique names and one unit."""
     checked = elements("cameras", cameras, Camera)
     different("cameras", [each.name for each in checked if each.name])
     if len(of_unit := {each.unit: f"{each.title} in {each.unit}" for each in checked}) > 1:
@@ -335,7 +332,6 @@ def _check_observed(block: Block) -> None:
 
 
 def _check_repeated(block: Block) -> None:
-    """Reject repeated image observations, which would count as independent."""
     again = repeated_pairs(block.image_photos, block.image_points, len(block.point_ids))
     if again.size:
         second = int(again[0])
@@ -420,11 +416,9 @@ def _check_motions(block: Block) -> None:
 
 
 def known_poses(block: Block) -> Bools:
-    """Return (P,) whether the pose of each photo is known."""
     poses = np.hstack([block.photo_positions, block.photo_attitudes])
     return np.asarray(np.isfinite(poses).all(axis=1))
 
 
 def unsupported(what: str, code: str, **fields: object) -> InputError:
-    """Return the error that a function does not support a part of a block."""
     return argument_error(what, "value", value=phrase(f"block.unsupported.{code}", **fields))

@@ -36,7 +36,6 @@ class OpencvLens:
 
     @property
     def matrix(self) -> Floats:
-        """(3, 3) K."""
         (fx, fy), (cx, cy) = self.focal, self.centre
         return np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
 
@@ -170,10 +169,7 @@ def focal_length_message(camera: Camera, single: Camera) -> str:
     if single is camera:
         return f"f is two unknowns of the model {camera.model}, fx and fy"
     changes = []
-    if (single.parameters.get("p1"), single.parameters.get("p2")) != (
-        camera.parameters.get("p1"),
-        camera.parameters.get("p2"),
-    ):
+    if any(single.parameters.get(name) != camera.parameters.get(name) for name in ("p1", "p2")):
         changes.append("its p1 and p2 are p2 and p1")
     if "w" in single.names:
         changes.append("cx and cy count from the middle of the picture")

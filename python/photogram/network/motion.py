@@ -7,8 +7,8 @@ photo do not apply to scanners.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from photogram.network.film_reduction import camera_images
 from photogram.network.moving_photos import Timed
 from photogram.network.observations import Observation, Smoothness
 from photogram.network.trajectories import Trajectory
-from photogram.network.unadjusted import Given
 
 PHOTOS, IMAGES = (rows_of(Block, rows) for rows in ("photos", "images"))
 """Arrays of a block with a row for each photo, and for each image."""
@@ -65,7 +64,6 @@ def of_photos(block: Block, kept: Bools) -> Block:
 
 
 def _observations(block: Block, there: set[str]) -> list[Observation]:
-    """Return the observations of these photos and their trajectories."""
     own = [(each.photo in there, one) for each, one in zip(block.timed, block.trajectories, strict=True)]
     flown = {id(one) for kept, one in own if kept}
     left = [one for kept, one in own if not kept and id(one) not in flown]
@@ -83,7 +81,6 @@ def _observations(block: Block, there: set[str]) -> list[Observation]:
 
 
 def timed_photos(block: Block) -> Bools:
-    """Return (P,) whether photos are on trajectories."""
     return _named(block, {each.photo for each in block.timed})
 
 
@@ -93,7 +90,6 @@ def on_shared(block: Block) -> Bools:
 
 
 def scanners(block: Block) -> Bools:
-    """Return (P,) whether photos are strips of a line scanner."""
     return _named(block, {each.photo for each in block.timed if each.lines is not None})
 
 
@@ -101,6 +97,43 @@ def _named(block: Block, names: set[str]) -> Bools:
     if not names:
         return np.zeros(len(block.photo_ids), dtype=bool)
     return np.array([name in names for name in block.photo_ids], dtype=bool)
+
+
+class Given(Protocol):
+    """Photos, points and image observations to adjust together: members that blocks and collections share."""
+
+    @property
+    def photo_ids(self) -> list[str]: ...
+
+    @property
+    def point_ids(self) -> list[str]: ...
+
+    @property
+    def point_positions(self) -> Floats: ...
+
+    @property
+    def point_sd(self) -> Floats: ...
+
+    @property
+    def image_photos(self) -> Indices: ...
+
+    @property
+    def image_points(self) -> Indices: ...
+
+    @property
+    def image_xy(self) -> Floats: ...
+
+    @property
+    def image_sd(self) -> Floats: ...
+
+    @property
+    def observations(self) -> Sequence[Observation]: ...
+
+    @property
+    def image_unit(self) -> str: ...
+
+    @property
+    def geographic(self) -> bool: ...
 
 
 def focal_images(network: Given) -> Floats:

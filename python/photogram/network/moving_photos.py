@@ -212,7 +212,6 @@ class Moment:
 
     @property
     def name(self) -> str:
-        """Name of the moment in reports."""
         clock = "" if self.clock is None else f", {self.clock.name}"
         return f"{self.trajectory.name} at {self.time!r} s{clock}"
 
@@ -311,7 +310,6 @@ class Timed:
 
 
 def require_photos(name: str, own: Sequence[str], photos: Sequence[str]) -> None:
-    """Reject repeated photos and photos that are not in the block."""
     known, seen = set(photos), set[str]()
     for photo in own:
         if photo not in known or photo in seen:

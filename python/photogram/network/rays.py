@@ -94,7 +94,6 @@ class LocalAxes:
 
     @property
     def cartesian(self) -> Cartesian:
-        """Cartesian axes of the block, geocentric if its space is geographic."""
         return Cartesian(self.block.spheroid)
 
     def positions(self, positions: Floats) -> Floats:
@@ -116,7 +115,6 @@ class LocalAxes:
 
 
 def local_axes(block: Block) -> LocalAxes:
-    """Return the metric axes of a block."""
     stations = _stations(block)
     if block.spheroid is not None and np.ptp(stations[:, 0]) > np.pi:  # Both sides of the antimeridian
         stations = np.column_stack([stations[:, 0] % (2 * np.pi), stations[:, 1:]])
@@ -181,7 +179,6 @@ class Rays:
         return cls(block, axes, axes.positions(block.photo_positions), axes.cameras(), used, unit)
 
     def without(self, images: Bools) -> Rays:
-        """Return the rays without some images."""
         return replace(self, used=self.used & ~images)
 
     def directions(self) -> Floats:

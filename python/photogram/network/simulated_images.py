@@ -227,7 +227,6 @@ def _timed(
 
 
 def _photo_cameras(block: Block) -> Indices:
-    """Return (P,) camera rows of the photos; 0 for principal distances."""
     given = block.photo_cameras
     return np.zeros(len(block.photo_ids), dtype=np.int64) if given is None else given
 

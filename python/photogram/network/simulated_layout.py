@@ -205,7 +205,6 @@ def control_pattern(plan: Layout, terrain: Floats, pattern: str, spacing: int) -
 
 
 def photo_ids(plan: Layout) -> list[str]:
-    """Return the names of the photographs, by strip and number."""
     strip_digits, number_digits = (max(2, len(str(count))) for count in (plan.strips, plan.photos_per_strip))
     return [
         f"{strip:0{strip_digits}d}{number:0{number_digits}d}"

@@ -101,7 +101,6 @@ def scanned(
 
 
 def _passes(layout: Layout, options: SimulationOptions, scanner: LineScanner) -> Iterator[_Pass]:
-    """Yield strips, or scenes, in sequence."""
     columns, rows = window(layout)
     all_columns, all_rows = grid(layout)
     half, scenes = options.footprint / 2, scanner.scenes

@@ -285,7 +285,6 @@ def _generator(seed: int | np.random.Generator) -> np.random.Generator:
 
 
 def _records(**columns: Iterable[object]) -> list[dict[str, object]]:
-    """Return the rows of columns."""
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 

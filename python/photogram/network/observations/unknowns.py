@@ -15,9 +15,9 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import listed
 from photogram.network.cameras import Camera
 from photogram.network.films import Film, FilmPlacement, FilmSize, Mark, Roll
-from photogram.network.knots import Knot
 from photogram.network.observations.columns import Observations, all_trajectories
 from photogram.network.observations.observation import Observation
+from photogram.network.passages import Knot
 from photogram.network.trajectories import Coefficient, Trajectory
 from photogram.network.unknowns import Sensor, Unknown
 
@@ -370,7 +370,6 @@ class Smoothness(Observation):
 
 
 def smoothness_of(trajectory: Trajectory) -> list[Observation]:
-    """Return the smoothness observations of the coefficients of a trajectory."""
     found: list[Observation] = []
     for basis, own in zip((trajectory.position, trajectory.rotation), trajectory.coefficients, strict=True):
         for numbers, factors, sd in [] if basis is None else basis.smoothed:
@@ -381,7 +380,6 @@ def smoothness_of(trajectory: Trajectory) -> list[Observation]:
 def with_smoothness(
     observations: Observations[Observation], trajectories: Sequence[Trajectory]
 ) -> Observations[Observation]:
-    """Add the missing smoothness observations of trajectories."""
     known = {one for each in observations.of_type(Smoothness) for one in each.unknowns}
     missing = [
         each
