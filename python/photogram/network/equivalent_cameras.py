@@ -27,7 +27,7 @@ _FISHEYES = frozenset(
 
 @dataclass(frozen=True)
 class OpencvLens:
-    """A camera with a lens of OpenCV, in the unit of the camera."""
+    """A camera with a lens of OpenCV, y down, in the unit of the camera."""
 
     fisheye: bool  # Whether it is equidistant
     focal: tuple[float, float]  # fx, fy and cx, cy

@@ -21,14 +21,17 @@ from photogram.network.block_checks import checked_cameras
 from photogram.network.geometry import Spheroid
 from photogram.network.motion import given_poses
 from photogram.network.refraction import Refraction
-from photogram.network.simulated_images import photograph, photographed, rolled, seen_side
-from photogram.network.simulated_layout import (
+from photogram.network.simulated_images import (
     control_pattern,
     flight,
     ground_points,
     into_object_space,
     laid_out,
+    photograph,
+    photographed,
     point_ids,
+    rolled,
+    seen_side,
 )
 from photogram.network.simulation_options import LONGEST, LineScanner, RollingShutter, SimulationOptions
 from photogram.network.trajectories import Readout
