@@ -11,7 +11,7 @@ import argparse
 import time
 
 from photogram import Block, adjust, simulate
-from photogram.network.simulated_motion import RollingShutter
+from photogram.network.simulated_images import RollingShutter
 
 
 def seconds(block: Block) -> tuple[float, int]:

@@ -24,7 +24,7 @@ from photogram import (
     adjust,
     snoop,
 )
-from photogram.network.subset import kept_images
+from photogram.network.motion import kept_images
 
 FINE = 1e-9
 

@@ -8,7 +8,7 @@ import pytest
 from golden_data import golden
 from message_codes import raises
 from photogram import Attitudes, Block, Camera, InputError, adjust
-from photogram.network.knots import beyond_knots
+from photogram.network.passages import beyond_knots
 
 CORE = {"fx": 700.0, "fy": 705.0, "cx": 640.0, "cy": 480.0}
 SPLINE = {"order": 3, "nx": 11, "ny": 8, "fov_x_deg": 120.0}

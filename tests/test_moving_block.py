@@ -21,8 +21,15 @@ from photogram.network import (
     Trajectory,
     Velocity,
 )
-from photogram.network.motion import at_rest, flown_by, focal_images, of_pictures, scanners, timed_photos
-from photogram.network.subset import of_photos
+from photogram.network.motion import (
+    at_rest,
+    flown_by,
+    focal_images,
+    of_photos,
+    of_pictures,
+    scanners,
+    timed_photos,
+)
 from photogram.words import Phrase
 
 

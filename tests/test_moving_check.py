@@ -20,7 +20,7 @@ from photogram import (
 from photogram.diagnosis.after_adjustment import errors_explained
 from photogram.diagnosis.conventions import hints
 from photogram.network import Lines, LineSensor, OnPlane, Plane, Polynomial, Table, Timed, Trajectory
-from photogram.network.directions import image_directions, seen_without_lenses
+from photogram.network.rays import image_directions, seen_without_lenses
 from photogram.results.fixed_tests import held_tested
 from photogram.words import Phrase
 

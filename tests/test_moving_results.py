@@ -40,7 +40,7 @@ from photogram.network import (
     Timed,
     Trajectory,
 )
-from photogram.network.subset import kept_images
+from photogram.network.motion import kept_images
 from photogram.results.trajectories import trajectories_table
 from photogram.show.page import about
 

@@ -12,7 +12,7 @@ from message_codes import nested_codes
 from photogram import Camera, adjust, diagnose, formats, simulate
 from photogram.cli import app
 from photogram.giant import Project, read_project, write_project
-from photogram.network.wider_models import with_parameters
+from photogram.network.equivalent_cameras import with_parameters
 from photogram.words import Phrase
 
 

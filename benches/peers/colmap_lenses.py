@@ -16,7 +16,7 @@ from solution import to_object_space
 from start import intersections
 
 from photogram import Block
-from photogram.network.directions import seen_without_lenses
+from photogram.network.rays import seen_without_lenses
 
 NOT_HELD = 1e9
 

@@ -23,7 +23,7 @@ from start import intersections
 
 import photogram
 from photogram import Block, Camera
-from photogram.network.directions import seen_without_lenses
+from photogram.network.rays import seen_without_lenses
 
 FREE = dict.fromkeys(("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2"), np.inf)
 TRUE = (

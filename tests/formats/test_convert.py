@@ -11,7 +11,7 @@ from message_codes import refused
 from photogram import Spheroid, adjust, formats
 from photogram.formats.models import in_topocentric, topocentric_remarks
 from photogram.network import lengths_of_units
-from photogram.network.directions import image_directions
+from photogram.network.rays import image_directions
 
 
 @pytest.mark.parametrize(

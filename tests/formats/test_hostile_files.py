@@ -16,8 +16,8 @@ from photogram.cli.job import default_out
 from photogram.formats import crs
 from photogram.formats.xml_stream import LONGEST, MOST, read_stream, root_of
 from photogram.io.delimited import read_columns
-from photogram.network.directions import seen_without_lenses
-from photogram.network.similarity import similarity
+from photogram.network.point_sets import similarity
+from photogram.network.rays import seen_without_lenses
 
 EXAMPLE = Path(formats.__path__[0]).with_name("examples") / "project"
 

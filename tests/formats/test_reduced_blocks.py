@@ -11,7 +11,7 @@ from test_plain_project import written
 from message_codes import refused
 from photogram import Attitudes, Camera, InputError, adjust, formats
 from photogram.formats import ReadOptions, supplements
-from photogram.network.directions import image_directions
+from photogram.network.rays import image_directions
 
 FOCAL = {"A": 8.67, "B": 9.315}
 

@@ -45,7 +45,7 @@ from photogram.network import (
     Shift,
     geometry,
 )
-from photogram.network.knots import KNOTTED
+from photogram.network.passages import KNOTTED
 
 __all__ = ["DATUMS", "KINDS", "MODELS", "RandomNetwork", "random_network"]
 

@@ -17,9 +17,9 @@ from photogram.diagnosis.sections import parts_of
 from photogram.diagnosis.sets import exchange
 from photogram.giant import Limits, Project, write_project
 from photogram.giant.checking import check
+from photogram.network.motion import kept_images, of_photos
+from photogram.network.point_sets import strips_of
 from photogram.network.rays import Rays
-from photogram.network.strips import strips_of
-from photogram.network.subset import kept_images, of_photos
 from photogram.show.quantity import Table
 
 GULF = {"spheroid": Spheroid.clarke_1866(), "origin": (math.radians(-95), math.radians(29.5), 0.0)}

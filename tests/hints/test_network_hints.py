@@ -12,7 +12,7 @@ from photogram.diagnosis.conventions import hints, verdicts
 from photogram.diagnosis.predictions import eligible, misfits, regressions, spread, view
 from photogram.giant import Project, write_project
 from photogram.network import project
-from photogram.network.directions import image_directions, seen_without_lenses
+from photogram.network.rays import image_directions, seen_without_lenses
 from photogram.words import Phrase
 
 IDENTITY = [[1, 0], [0, 1]]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from photogram.network.hull import area, hull, outside
+from photogram.network.point_sets import area, hull, outside
 from photogram.results.statement.comparison import layout as layout_of
 
 SQUARE = np.array([[0.0, 0.0, 0.0], [100.0, 0.0, 10.0], [100.0, 100.0, 20.0], [0.0, 100.0, 0.0]])
@@ -100,7 +100,7 @@ def test_a_block_at_one_place_has_no_layout():
 
 
 def test_the_hull_of_many_points_is_that_of_all():
-    from photogram.network import hull as module
+    from photogram.network import point_sets as module
 
     random = np.random.default_rng(3)
     for points in (

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from message_codes import as_check, coded, has_code
 from photogram import AdjustmentError, InputError, _photocore
 from photogram.cli import app
-from photogram.network.neighbours import mutually_nearest
+from photogram.network.point_sets import mutually_nearest
 from photogram.stellar import (
     ARCSEC,
     Air,

@@ -20,7 +20,7 @@ from photogram.errors import InputError, RankError, message_of
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, refuse_trajectories
 from photogram.network.datum import MinimumConstraints
-from photogram.network.subset import kept_images, of_photos
+from photogram.network.motion import kept_images, of_photos
 from photogram.results.result import Result
 from photogram.show.judgement import remarks_section
 from photogram.show.methods import Documented

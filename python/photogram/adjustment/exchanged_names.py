@@ -18,8 +18,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network.block import Block
-from photogram.network.directions import seen_without_lenses
-from photogram.network.rays import Rays, counts_of, meet, sums_of
+from photogram.network.rays import Rays, counts_of, meet, seen_without_lenses, sums_of
 from photogram.results.snooping_log import Exchange
 from photogram.statistics.likelihood import are_exchanged
 

@@ -21,13 +21,12 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message, listed
 from photogram.network.attitudes import Attitudes, angles_form
 from photogram.network.block import Block, flown_by, require_block
-from photogram.network.directions import direction_deviations, image_directions
 from photogram.network.film_reduction import as_seen, is_scanned
 from photogram.network.geometry import Cartesian
-from photogram.network.motion import at_rest, timed_photos
+from photogram.network.motion import at_rest, kept_images, of_photos, timed_photos, with_rejected_points
 from photogram.network.observations import Distance
-from photogram.network.similarity import similarity
-from photogram.network.subset import kept_images, of_photos, with_rejected_points
+from photogram.network.point_sets import similarity
+from photogram.network.rays import direction_deviations, image_directions
 from photogram.summaries import Brief
 from photogram.words import Phrase, phrase
 

@@ -22,10 +22,9 @@ from photogram.messages import Message
 from photogram.network import geometry
 from photogram.network.block import Block, checked, of_images_alone, refuse_trajectories
 from photogram.network.cameras import images_of
-from photogram.network.motion import on_shared, timed_photos
+from photogram.network.motion import image_rows, on_shared, timed_photos
 from photogram.network.observations import Attitude, Position, Rate, Smoothness, Velocity
 from photogram.network.projecting import projected_images
-from photogram.network.subset import image_rows
 from photogram.results.result import Result
 from photogram.words import phrase
 

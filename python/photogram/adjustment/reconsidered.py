@@ -20,10 +20,9 @@ from photogram.arguments.types import Bools
 from photogram.errors import AdjustmentError
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.network.directions import direction_deviations, image_directions
 from photogram.network.geometry import Cartesian
-from photogram.network.motion import timed_photos
-from photogram.network.subset import kept_images
+from photogram.network.motion import kept_images, timed_photos
+from photogram.network.rays import direction_deviations, image_directions
 from photogram.results.result import Result
 from photogram.words import Phrase, phrase
 

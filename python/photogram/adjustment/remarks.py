@@ -14,9 +14,9 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError, RankError, message_of
 from photogram.messages import Message, Undetermined, listed
 from photogram.network.block import Block, position_columns
+from photogram.network.block_checks import ATTITUDE_COLUMNS
 from photogram.network.motion import on_shared
 from photogram.network.refraction import metres_per_unit
-from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.network.trajectories import Coefficient
 from photogram.results.parts import adjusted_cameras
 from photogram.words import Phrase, phrase

@@ -33,8 +33,7 @@ from photogram.messages import Message
 from photogram.network.block import Block, checked
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import InnerConstraints
-from photogram.network.motion import timed_photos
-from photogram.network.subset import image_rows, with_rejected_points
+from photogram.network.motion import image_rows, timed_photos, with_rejected_points
 from photogram.results.evaluation import type_factors
 from photogram.results.fixed_tests import held_remark, held_tested
 from photogram.results.hypothesis_tests import hypotheses, largest_odds

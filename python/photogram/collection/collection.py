@@ -15,10 +15,10 @@ from photogram.arguments.types import FREE, ONE, Array, Floats, IndexArray
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import converting_dataclass, field, replace
 from photogram.network.block import span
+from photogram.network.block_checks import numbered
 from photogram.network.cameras import camera_facts
-from photogram.network.knots import KNOTTED
 from photogram.network.observations import Observation, Observations
-from photogram.network.tables import numbered
+from photogram.network.passages import KNOTTED
 from photogram.summaries import Brief, Rows
 from photogram.words import phrase
 

@@ -28,7 +28,7 @@ from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.core_arrays import CoreOptions
-from photogram.network.subset import image_rows
+from photogram.network.motion import image_rows
 from photogram.results.network_trial import (
     ATTITUDE,
     CONTROL,

@@ -25,7 +25,7 @@ from photogram.errors import InputError
 from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import Message
-from photogram.network.neighbours import mutually_nearest
+from photogram.network.point_sets import mutually_nearest
 from photogram.words import Phrase, phrase
 
 # Quarter rotations that move a corner of the plate to its first corner (least X and Y), with KROTC of the

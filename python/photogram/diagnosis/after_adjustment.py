@@ -23,7 +23,7 @@ from photogram.diagnosis.registry import hints_at
 from photogram.errors import AdjustmentError, InputError, OutOfMemoryError
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.network.subset import kept_images, of_photos
+from photogram.network.motion import kept_images, of_photos
 from photogram.results.findings import HARMFUL
 from photogram.results.fixed_tests import is_suspected
 from photogram.results.result import Result

@@ -34,9 +34,8 @@ from photogram.errors import AdjustmentError
 from photogram.io.angles import ARCSEC
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.block import Block, flown_by
-from photogram.network.directions import seen_without_lenses
-from photogram.network.rays import Rays, meet
-from photogram.network.subset import kept_images, of_photos
+from photogram.network.motion import kept_images, of_photos
+from photogram.network.rays import Rays, meet, seen_without_lenses
 from photogram.results.network_trial import ATTITUDE, CONTROL, IMAGE, OBSERVATION, POSITION, BlockSuspects
 from photogram.results.result import Result
 from photogram.results.snooping_log import Aside, Exchange, Removal

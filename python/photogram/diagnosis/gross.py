@@ -10,8 +10,8 @@ from photogram.arguments.types import Bools, Floats
 from photogram.diagnosis.findings import Level, Section, section_of
 from photogram.diagnosis.tested_values import grouped, mad_sd
 from photogram.network.block import Block
+from photogram.network.motion import kept_images, of_photos
 from photogram.network.rays import Rays
-from photogram.network.subset import kept_images, of_photos
 
 BAD_PHOTO = 4.0  # A bad photo exceeds the median residual of the median photo by this factor,
 BAD_PHOTO_SD = 4.3

@@ -18,8 +18,8 @@ from photogram.diagnosis.findings import Finding, Level, finding
 from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
-from photogram.network.directions import seen_without_lenses
-from photogram.network.subset import kept_images
+from photogram.network.motion import kept_images
+from photogram.network.rays import seen_without_lenses
 from photogram.results.result import Result
 from photogram.statistics.likelihood import Judged, judged
 from photogram.words import Phrase, phrase

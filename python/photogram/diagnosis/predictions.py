@@ -18,8 +18,8 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.diagnosis.mistakes import Proposal
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
+from photogram.network.motion import kept_images
 from photogram.network.rays import Rays
-from photogram.network.subset import kept_images
 from photogram.words import Phrase, phrase
 
 LEAST = 6  # Known or intersected points that a photo needs

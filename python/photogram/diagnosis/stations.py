@@ -10,8 +10,8 @@ from photogram.diagnosis.findings import Level, Section, section_of
 from photogram.diagnosis.tested_values import MAD_TO_SD, grouped
 from photogram.network import geometry
 from photogram.network.block import Block
+from photogram.network.point_sets import strips_of
 from photogram.network.rays import local_axes
-from photogram.network.strips import strips_of
 from photogram.results.result import Result
 
 LOOK, GRAVE = 8.0, 20.0

@@ -34,14 +34,12 @@ from photogram.diagnosis.sets import arm_of
 from photogram.errors import InputError
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.network.directions import image_directions
 from photogram.network.geometry import Cartesian
-from photogram.network.motion import given_poses, timed_images, timed_photos
+from photogram.network.motion import given_poses, kept_images, timed_images, timed_photos
 from photogram.network.moving_photos import Lines, Moment, Timed
 from photogram.network.observations import Position
 from photogram.network.projecting import projected_images
-from photogram.network.rays import meet_rays
-from photogram.network.subset import kept_images
+from photogram.network.rays import image_directions, meet_rays
 from photogram.network.trajectories import Table, Trajectory
 from photogram.words import Phrase, phrase
 

@@ -19,7 +19,7 @@ from photogram.io.structure import Decoder, Encoder
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
 from photogram.network.films import Scan
-from photogram.network.subset import IMAGES, PHOTOS
+from photogram.network.motion import IMAGES, PHOTOS
 from photogram.network.unknowns import Unknown
 from photogram.results.block_files import saved_classes
 from photogram.words import phrase

@@ -23,8 +23,8 @@ from photogram.network.attitudes import angles_form, known_angles
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.frame import Frame
+from photogram.network.moving_photos import Mount
 from photogram.network.observations import Control, Observation, Observations, Position
-from photogram.network.rigs import Mount
 from photogram.network.trajectories import Clock
 from photogram.network.unknowns import Sensor
 from photogram.words import Phrase, option_sd, phrase

@@ -27,7 +27,7 @@ from photogram.io.packed_numbers import pieces
 from photogram.messages import Message
 from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
-from photogram.network.directions import image_directions
+from photogram.network.rays import image_directions
 from photogram.words import Phrase, phrase
 
 FILE, LIST = "bundle.out", "list.txt"

@@ -27,7 +27,7 @@ from photogram.io.places import Place
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
 from photogram.network.observations import Position
-from photogram.network.similarity import similarity
+from photogram.network.point_sets import similarity
 from photogram.words import Phrase, phrase
 
 WGS84 = "EPSG:4979"

@@ -16,7 +16,7 @@ from photogram.formats.project import Project, Size
 from photogram.io.numbers import scaled
 from photogram.io.places import Failing
 from photogram.network.cameras import Camera
-from photogram.network.opencv_lens import OpencvLens, opencv_lens
+from photogram.network.equivalent_cameras import OpencvLens, opencv_lens
 from photogram.words import phrase
 
 

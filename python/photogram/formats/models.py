@@ -18,14 +18,17 @@ from photogram.network.attitudes import angles_form, known_angles, known_matrice
 from photogram.network.block import Block, refuse_passages, refuse_trajectories
 from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
-from photogram.network.directions import image_directions
 from photogram.network.films import Scan
 from photogram.network.frame import Frame
-from photogram.network.geometry import Cartesian, Spheroid, lengths_of_units, local_frames
-from photogram.network.motion import on_shared, scanners
+from photogram.network.geometry import (
+    Cartesian,
+    Spheroid,
+    lengths_of_units,
+    local_frames,
+)
+from photogram.network.motion import kept_images, on_shared, scanners
 from photogram.network.observations import Control, Position
-from photogram.network.rays import LocalAxes, meet_rays
-from photogram.network.subset import kept_images
+from photogram.network.rays import LocalAxes, image_directions, meet_rays
 from photogram.words import Phrase, phrase
 
 

@@ -34,7 +34,7 @@ from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
-from photogram.network.directions import image_directions
+from photogram.network.rays import image_directions
 from photogram.words import Phrase, option_sd, phrase
 
 BETTER = 3.0  # Smallest ratio of misfits for which rotations are transposed

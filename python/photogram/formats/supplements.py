@@ -27,16 +27,16 @@ from photogram.io.column_table import ColumnTable
 from photogram.io.places import Place, at_place
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.network.frame import Frame
-from photogram.network.motion import timed_photos
-from photogram.network.similarity import similarity
-from photogram.network.wider_models import (
+from photogram.network.equivalent_cameras import (
     focal_length_message,
     freed,
     matching_word,
     with_one_focal_length,
     with_parameters,
 )
+from photogram.network.frame import Frame
+from photogram.network.motion import timed_photos
+from photogram.network.point_sets import similarity
 from photogram.results.result import Result
 from photogram.words import OPTIONS_OF_CONTROL, Phrase, option_sd, phrase
 

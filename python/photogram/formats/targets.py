@@ -17,9 +17,8 @@ from photogram.formats.read_options import ReadOptions
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.network.knots import Knot
 from photogram.network.observations import Prior
-from photogram.network.passages import Figure
+from photogram.network.passages import Figure, Knot
 from photogram.network.unknowns import Sensor
 from photogram.targets.board import Board
 from photogram.targets.calibration import Calibration

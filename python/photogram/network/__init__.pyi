@@ -23,6 +23,7 @@ from .geometry import viewing_directions as viewing_directions
 from .lens import Lens as Lens
 from .moving_photos import Lines as Lines
 from .moving_photos import LineSensor as LineSensor
+from .moving_photos import Mount as Mount
 from .moving_photos import Shutter as Shutter
 from .moving_photos import Timed as Timed
 from .observations import Attitude as Attitude
@@ -48,7 +49,6 @@ from .observations import Velocity as Velocity
 from .passages import Bend as Bend
 from .passages import Figure as Figure
 from .projecting import projected as projected
-from .rigs import Mount as Mount
 from .simulated_observations import with_distances as with_distances
 from .simulated_observations import with_gnss as with_gnss
 from .simulated_observations import with_inertial as with_inertial

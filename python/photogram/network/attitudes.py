@@ -199,7 +199,6 @@ class Attitudes:
 
 
 def angles_form(photo_to_ground: bool) -> Representation:
-    """Return the representation of the angles of a block."""
     return "omega_phi_kappa_photo_to_ground" if photo_to_ground else "omega_phi_kappa"
 
 

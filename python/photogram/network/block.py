@@ -27,13 +27,20 @@ from photogram.arguments.types import (
 )
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import converting_dataclass, field, fields
-from photogram.network.block_checks import check_block, known_poses, unsupported
+from photogram.network.block_checks import (
+    GEOGRAPHIC_COLUMNS,
+    RECTANGULAR_COLUMNS,
+    Table,
+    check_block,
+    known_poses,
+    table_arguments,
+    unsupported,
+)
 from photogram.network.cameras import Camera, CameraRow, camera_rows
 from photogram.network.films import reads_pixels
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
-from photogram.network.knots import Knots
-from photogram.network.moving_photos import Timed
+from photogram.network.moving_photos import Mount, Timed
 from photogram.network.observations import (
     Observation,
     Observations,
@@ -42,15 +49,8 @@ from photogram.network.observations import (
     of_records,
 )
 from photogram.network.observations.columns import Group
-from photogram.network.passages import Passage
+from photogram.network.passages import Knots, Passage
 from photogram.network.refraction import Refraction
-from photogram.network.rigs import Mount
-from photogram.network.tables import (
-    GEOGRAPHIC_COLUMNS,
-    RECTANGULAR_COLUMNS,
-    Table,
-    table_arguments,
-)
 from photogram.network.trajectories import Trajectory
 from photogram.network.unknowns import Unknown, different_unknowns
 from photogram.summaries import Brief, Rows, few
@@ -244,12 +244,10 @@ class Block(Valued, Brief):
 
     @cached_property
     def _photo_rows(self) -> dict[str, int]:
-        """Row of each photo by name."""
         return {name: row for row, name in enumerate(self.photo_ids)}
 
     @cached_property
     def _point_rows(self) -> dict[str, int]:
-        """Row of each point by name."""
         return {name: row for row, name in enumerate(self.point_ids)}
 
     @cached_property
@@ -453,7 +451,6 @@ def of_images_alone(block: Block, what: str) -> Block:
 
 
 def refuse_trajectories(block: Block, what: str) -> None:
-    """Reject a block with photos or observations on trajectories."""
     if moving := flown_by(block):
         raise unsupported(what, "trajectories", reason=moving)
 
@@ -474,11 +471,9 @@ def checked(block: Block) -> Block:
 
 
 def require_block(block: object) -> None:
-    """Reject an argument that is not a block."""
     if not isinstance(block, Block):
         raise kind_error("block", "a Block", block)
 
 
 def position_columns(block: Block) -> tuple[str, str, str]:
-    """Return the names of the three columns of positions in tables."""
     return GEOGRAPHIC_COLUMNS if block.geographic else RECTANGULAR_COLUMNS

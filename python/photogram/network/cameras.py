@@ -26,7 +26,7 @@ from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import NONE, ZERO, Floats, Indices, OptionalArray
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import converting_dataclass, field, replace
-from photogram.network.knots import Knot, checked_knot_sd, checked_knots, knot_names, knot_unknowns
+from photogram.network.passages import Knot, checked_knot_sd, checked_knots, knot_names, knot_unknowns
 from photogram.summaries import Brief, Rows
 from photogram.words import phrase
 
@@ -64,7 +64,6 @@ def _models() -> dict[str, CameraFacts]:
 
 
 def camera_facts(model: str) -> CameraFacts:
-    """Return the facts of a model."""
     return _models()[model]
 
 
@@ -75,7 +74,6 @@ def _names() -> tuple[str, ...]:
 
 
 def parameter_names(model: str) -> tuple[str, ...]:
-    """Return the names of the parameters of a model, in its order."""
     return tuple(name for name, _ in camera_facts(model)[1])
 
 
@@ -393,7 +391,6 @@ def images_of(cameras: Sequence[Camera], which: Indices, directions: Floats) -> 
 
 
 def camera_rows(cameras: Sequence[Camera]) -> list[CameraRow]:
-    """Convert cameras to rows for the core."""
     return [
         (
             each.model + (_MEASURED if each.weights == "measured" else ""),

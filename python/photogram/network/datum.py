@@ -92,7 +92,6 @@ class MinimumConstraints:
 
 
 def check_datum(datum: object) -> None:
-    """Reject an argument that is not a datum."""
     if not isinstance(datum, InnerConstraints | MinimumConstraints | None):
         raise kind_error("datum", "InnerConstraints, MinimumConstraints or None", datum)
 

@@ -9,9 +9,9 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.arrays import frozen
 from photogram.arguments.types import Floats
-from photogram.lazy_dataclasses import dataclass
+from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
-from photogram.network.films import Film, FilmNumbers, Scan
+from photogram.network.films import Film, FilmNumbers, Readings, Scan
 from photogram.network.observations import Fiducial
 
 FEWEST = 4  # Minimum number of marks for an affine fit with redundancy
@@ -21,7 +21,6 @@ _DIFFERENCES = np.array([[1.0, 0.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, 0.0, 1.0]])
 
 
 def is_scanned(block: Block) -> bool:
-    """Whether images of a block are readings of scanned films or plates."""
     return any(isinstance(each, Scan) for each in block.passages)
 
 
@@ -133,40 +132,28 @@ def affine_form(film: Film, vectors: Sequence[Floats], cofactors: Floats) -> Aff
         film.placement, film.size, film.scanner, film.readings, roll=film.roll, mirrored=film.mirrored
     )
     numbers = np.array([own[id(each)] for each in parts])
-    readings, partials = _photocore.film_readings(plain.numbers(), numbers, _PLACES)
-    by_film = np.einsum("ij,jkl->kil", _DIFFERENCES, partials[:, :, 2:8])
-    values = np.concatenate([own[id(film.placement)], own[id(film.size)]])
-    if film.roll is not None:
-        values[3] += own[id(film.roll)][0]
-    found, said = _said(values, mirrored=film.mirrored)
-    with np.errstate(invalid="ignore"):
-        sd = np.sqrt(np.einsum("ik,kl,il->i", said, cofactors, said))
-        matrix_sd = np.sqrt(np.einsum("aik,kl,ail->ai", by_film, cofactors, by_film))
-    scale_x, scale_y, between, rotation = found.tolist()
-    matrix = (_DIFFERENCES @ readings).T
-    return Affine(frozen(matrix), scale_x, scale_y, between, rotation, frozen(sd), frozen(matrix_sd))
-
-
-def _said(values: Floats, *, mirrored: bool) -> tuple[Floats, Floats]:
-    """Return scales, angle between axes and rotation, and partials by the six film parameters.
-
-    The columns of R J (I + S) are the images of the axes.
-    """
-    theta, m, b1, b2 = values[2:6]
-    side = -1.0 if mirrored else 1.0
-    straight = np.array([[side * (1 + m + b1), side * b2], [b2, 1 + m - b1]])
-    x, y = straight[:, 0], straight[:, 1]
-    # Partial derivatives by m, b1, b2.
-    by_x = np.array([[side, side, 0.0], [0.0, 0.0, 1.0]])
-    by_y = np.array([[0.0, 0.0, side], [1.0, -1.0, 0.0]])
-    lengths = np.hypot(*x), np.hypot(*y)
-    turns = np.arctan2(x[1], x[0]), np.arctan2(y[1], y[0])
-    of_x = np.array([-x[1], x[0]]) @ by_x / lengths[0] ** 2
-    of_y = np.array([-y[1], y[0]]) @ by_y / lengths[1] ** 2
-    partials = np.zeros((4, 6))
-    partials[0, 3:], partials[1, 3:] = x @ by_x / lengths[0], y @ by_y / lengths[1]
-    partials[2, 3:] = side * (of_y - of_x)
-    partials[3, 3:], partials[3, 2] = of_x, 1.0
+    readings, by_film = _affine(plain, numbers)
+    theta, side = float(numbers[0, 2]), -1.0 if film.mirrored else 1.0
+    # The columns of J (I + S), without placement and scanner, are the images of the axes.
+    numbers[0], numbers[-1] = 0.0, (1.0, 1.0, 0.0)
+    (_, x, y), (_, by_x, by_y) = _affine(replace(plain, readings=Readings()), numbers)
+    lengths, turns = (np.hypot(*x), np.hypot(*y)), (np.arctan2(x[1], x[0]), np.arctan2(y[1], y[0]))
+    of_x, of_y = (
+        np.array([-each[1], each[0]]) @ by / length**2
+        for each, by, length in zip((x, y), (by_x, by_y), lengths, strict=True)
+    )
     between = side * (turns[1] - turns[0]) - np.pi / 2
     between = (between + np.pi) % (2 * np.pi) - np.pi
-    return np.array([*lengths, between, turns[0] + theta]), partials
+    partials = np.array([x @ by_x / lengths[0], y @ by_y / lengths[1], side * (of_y - of_x), of_x])
+    with np.errstate(invalid="ignore"):
+        sd = np.sqrt(np.einsum("ik,kl,il->i", partials, cofactors, partials))
+        matrix_sd = np.sqrt(np.einsum("ijk,kl,ijl->ji", by_film, cofactors, by_film))
+    (scale_x, scale_y), rotation = map(float, lengths), float(turns[0] + theta)
+    matrix = frozen(readings.T)
+    return Affine(matrix, scale_x, scale_y, float(between), rotation, frozen(sd), frozen(matrix_sd))
+
+
+def _affine(film: Film, vectors: Floats) -> tuple[Floats, Floats]:
+    """Return (3, 2) a0, a1, a2 of both readings, and their (3, 2, 6) partials by t1 to b2."""
+    readings, partials = _photocore.film_readings(film.numbers(), vectors, _PLACES)
+    return _DIFFERENCES @ readings, np.einsum("ij,jkl->ikl", _DIFFERENCES, partials[:, :, 2:8])

@@ -1,4 +1,4 @@
-"""Photos and records on trajectories: selection, image times and poses.
+"""Parts of a block: selected photos and images; photos on trajectories, their image times and poses.
 
 A frame photo, or a rolling-shutter photo, has nearly the same pose for all its images. A scanner has a
 different pose for each line, and its coordinates are samples and lines. Functions that assume one pose per
@@ -7,23 +7,80 @@ photo do not apply to scanners.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
-from photogram.arguments.arrays import rows_of_each
+from photogram.arguments.arrays import frozen, rows_of_each
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.network.block import Block, flown_by
+from photogram.network.block_checks import rows_of
 from photogram.network.film_reduction import camera_images
 from photogram.network.moving_photos import Timed
-from photogram.network.observations import Smoothness
-from photogram.network.subset import kept_images, of_photos
+from photogram.network.observations import Observation, Smoothness
 from photogram.network.trajectories import Trajectory
-from photogram.network.unadjusted import Given
+
+PHOTOS, IMAGES = (rows_of(Block, rows) for rows in ("photos", "images"))
+"""Arrays of a block with a row for each photo, and for each image."""
+
+
+def image_rows(network: object, kept: Indices | Bools) -> dict[str, Any]:
+    """Return the image arrays of a block or collection by name, for some rows or a mask."""
+    return {name: getattr(network, name)[kept] for name in IMAGES}
+
+
+def kept_images(block: Block, kept: Indices | Bools) -> Block:
+    """Return a block with some of its images, by unique rows or a mask; it remains valid."""
+    own = block.kept()
+    for name, values in image_rows(block, kept).items():
+        object.__setattr__(own, name, frozen(values))
+    return own
+
+
+def with_rejected_points(block: Block, before: Block) -> Block:
+    """Record the points that lost their last image observation since an earlier block."""
+    lost = np.setdiff1d(before.image_points, block.image_points)
+    names = {before.point_ids[row] for row in lost.tolist()}
+    own = block.kept()
+    object.__setattr__(own, "rejected_points", before.rejected_points | names)
+    return own
+
+
+def of_photos(block: Block, kept: Bools) -> Block:
+    """Return a block of the photos `kept` (P,), with their images and observations."""
+    fewer = kept_images(block, kept[block.image_photos])
+    number = np.cumsum(kept) - 1
+    names = [name for name, own in zip(block.photo_ids, kept.tolist(), strict=True) if own]
+    there = set(names)
+    return fewer.replace(
+        photo_ids=names,
+        observations=_observations(block, there),
+        mounts=[each for each in block.mounts if each.photo in there],
+        timed=[each for each in block.timed if each.photo in there],
+        image_photos=number[fewer.image_photos],
+        **{name: values[kept] for name in PHOTOS if (values := getattr(block, name)) is not None},
+    )
+
+
+def _observations(block: Block, there: set[str]) -> list[Observation]:
+    own = [(each.photo in there, one) for each, one in zip(block.timed, block.trajectories, strict=True)]
+    flown = {id(one) for kept, one in own if kept}
+    left = [one for kept, one in own if not kept and id(one) not in flown]
+    trajectories = {id(each) for each in left}
+    coefficients = {id(each) for one in left for all_ in one.coefficients for each in all_}
+
+    def stays(each: Observation) -> bool:
+        if each.moment is not None:
+            return id(each.moment.trajectory) not in trajectories
+        if isinstance(each, Smoothness):
+            return not any(id(one) in coefficients for one in each.unknowns)
+        return there.issuperset(each.photos)
+
+    return [each for each in block.observations if stays(each)]
 
 
 def timed_photos(block: Block) -> Bools:
-    """Return (P,) whether photos are on trajectories."""
     return _named(block, {each.photo for each in block.timed})
 
 
@@ -33,7 +90,6 @@ def on_shared(block: Block) -> Bools:
 
 
 def scanners(block: Block) -> Bools:
-    """Return (P,) whether photos are strips of a line scanner."""
     return _named(block, {each.photo for each in block.timed if each.lines is not None})
 
 
@@ -41,6 +97,43 @@ def _named(block: Block, names: set[str]) -> Bools:
     if not names:
         return np.zeros(len(block.photo_ids), dtype=bool)
     return np.array([name in names for name in block.photo_ids], dtype=bool)
+
+
+class Given(Protocol):
+    """Photos, points and image observations to adjust together: members that blocks and collections share."""
+
+    @property
+    def photo_ids(self) -> list[str]: ...
+
+    @property
+    def point_ids(self) -> list[str]: ...
+
+    @property
+    def point_positions(self) -> Floats: ...
+
+    @property
+    def point_sd(self) -> Floats: ...
+
+    @property
+    def image_photos(self) -> Indices: ...
+
+    @property
+    def image_points(self) -> Indices: ...
+
+    @property
+    def image_xy(self) -> Floats: ...
+
+    @property
+    def image_sd(self) -> Floats: ...
+
+    @property
+    def observations(self) -> Sequence[Observation]: ...
+
+    @property
+    def image_unit(self) -> str: ...
+
+    @property
+    def geographic(self) -> bool: ...
 
 
 def focal_images(network: Given) -> Floats:

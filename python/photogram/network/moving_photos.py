@@ -1,4 +1,4 @@
-"""Photos on trajectories: frames, rolling shutters, line scanners, and times of records."""
+"""Photos whose poses follow from others: rigs, rolling shutters, line scanners, and times of records."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import argument_error, number, numbers, object_name, shaped
+from photogram.arguments.arrays import argument_error, elements, number, numbers, object_name, shaped
 from photogram.arguments.equality import Valued
 from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import kind_error, require
@@ -24,6 +24,7 @@ from photogram.words import phrase
 
 if TYPE_CHECKING:
     from photogram import Block
+
 
 Direction = Literal["down", "up", "right", "left"]
 
@@ -211,7 +212,6 @@ class Moment:
 
     @property
     def name(self) -> str:
-        """Name of the moment in reports."""
         clock = "" if self.clock is None else f", {self.clock.name}"
         return f"{self.trajectory.name} at {self.time!r} s{clock}"
 
@@ -310,7 +310,6 @@ class Timed:
 
 
 def require_photos(name: str, own: Sequence[str], photos: Sequence[str]) -> None:
-    """Reject repeated photos and photos that are not in the block."""
     known, seen = set(photos), set[str]()
     for photo in own:
         if photo not in known or photo in seen:
@@ -345,3 +344,38 @@ def trajectory_of(block: Block, own: Timed) -> Trajectory:
         position=Polynomial(1, time, 1.0, values, sd),
         rotation=Polynomial(1, time, 1.0, turns, sd_turn),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Mount:
+    """Mount of a photo: its sensor is fixed on a frame, A = A_f A_s, C = C_f + A_f c.
+
+    The pose of the photo follows from frame and sensor; its pose in the block is only an approximation.
+
+    Parameters
+    ----------
+    photo
+        Name of the photo.
+    frame
+        Name of the photo that represents the frame: the photo of the first sensor. It may be without images.
+    sensor
+        Pose of the sensor in the frame, one object for all its photos.
+    """
+
+    photo: str = field(metadata={"check": object_name})
+    frame: str = field(metadata={"check": object_name})
+    sensor: Sensor
+
+    def __post_init__(self) -> None:
+        check_fields(self, "a mount")
+
+
+def checked_mounts(mounts: object, photos: Sequence[str]) -> tuple[Mount, ...]:
+    """Return validated mounts that are consistent with each other and with a block."""
+    checked = elements("mounts", mounts, Mount)
+    frames = {each.frame for each in checked}
+    require_photos("mounts", [each.photo for each in checked], photos)
+    require_photos("mounts", sorted(frames), photos)
+    if both := sorted(frames & {each.photo for each in checked}):
+        raise InputError(phrase("block.mounted-frame", photo=both[0]))
+    return checked

@@ -28,7 +28,6 @@ ROUNDED = 1e-9  # Relative to the whole readout: largest effect of rounding
 
 
 def given(unknown: Unknown) -> tuple[Floats, Floats]:
-    """Return the given position and rotation of a shared unknown."""
     return unknown.position, unknown.attitude
 
 

@@ -22,9 +22,9 @@ from photogram.errors import InputError
 from photogram.network import geometry
 from photogram.network.block import Block
 from photogram.network.geometry import Cartesian, photo_axes
+from photogram.network.moving_photos import Mount
 from photogram.network.observations import Attitude, Distance, Observation, Observations, Position
-from photogram.network.rigs import Mount
-from photogram.network.simulated_motion import photo_angles
+from photogram.network.simulated_images import photo_angles
 from photogram.network.simulation import Simulation
 from photogram.network.unknowns import Boresight, Drift, Instrument, LeverArm, Sensor, Shift
 from photogram.words import phrase

@@ -16,9 +16,7 @@ from photogram.network.motion import about, given_poses
 from photogram.network.moving_photos import Lines, LineSensor, Timed
 from photogram.network.observations import Attitude, Observations, Position
 from photogram.network.projecting import projected, standing
-from photogram.network.simulated_images import Taken
-from photogram.network.simulated_layout import Layout, grid, photo_ids, window
-from photogram.network.simulated_motion import photo_angles
+from photogram.network.simulated_images import Layout, Taken, grid, photo_angles, photo_ids, window
 from photogram.network.simulation_options import LineScanner, SimulationOptions
 from photogram.network.trajectories import Polynomial, Spline, Table, Trajectory
 
@@ -102,7 +100,6 @@ def scanned(
 
 
 def _passes(layout: Layout, options: SimulationOptions, scanner: LineScanner) -> Iterator[_Pass]:
-    """Yield strips, or scenes, in sequence."""
     columns, rows = window(layout)
     all_columns, all_rows = grid(layout)
     half, scenes = options.footprint / 2, scanner.scenes

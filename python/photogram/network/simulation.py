@@ -17,21 +17,23 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import counted
 from photogram.network import geometry
 from photogram.network.block import Block
+from photogram.network.block_checks import checked_cameras
 from photogram.network.geometry import Spheroid
 from photogram.network.motion import given_poses
 from photogram.network.refraction import Refraction
-from photogram.network.simulated_images import photograph, photographed, seen_side
-from photogram.network.simulated_layout import (
+from photogram.network.simulated_images import (
     control_pattern,
     flight,
     ground_points,
     into_object_space,
     laid_out,
+    photograph,
+    photographed,
     point_ids,
+    rolled,
+    seen_side,
 )
-from photogram.network.simulated_motion import rolled
 from photogram.network.simulation_options import LONGEST, LineScanner, RollingShutter, SimulationOptions
-from photogram.network.tables import checked_cameras
 from photogram.network.trajectories import Readout
 from photogram.words import phrase
 
@@ -286,7 +288,6 @@ def _generator(seed: int | np.random.Generator) -> np.random.Generator:
 
 
 def _records(**columns: Iterable[object]) -> list[dict[str, object]]:
-    """Return the rows of columns."""
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
 
 

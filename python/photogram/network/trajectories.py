@@ -23,7 +23,7 @@ from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.network.unknowns import ROTATION, Numbers, Unknown, are_rotations
+from photogram.network.unknowns import Numbers, rotations
 from photogram.words import phrase
 
 Interpolation = Literal["linear", "hermite", "lagrange"]
@@ -66,15 +66,8 @@ class GyroBias(Numbers):
     KIND = "gyro bias"
 
 
-class _Scalar(Unknown):
-    _VALUES = slice(3)
-
-    def _position(self) -> Floats:
-        return np.array([number(f"value of {self.title}", getattr(self, "value")), 0.0, 0.0])  # noqa: B009
-
-
 @dataclass(frozen=True, eq=False)
-class Clock(_Scalar):
+class Clock(Numbers):
     """Offset d of a clock: its time t is t + d of the trajectory.
 
     Parameters
@@ -88,11 +81,10 @@ class Clock(_Scalar):
     KIND = "clock"
 
     value: float = 0.0
-    sd: ArrayLike = np.inf
 
 
 @dataclass(frozen=True, eq=False)
-class Readout(_Scalar):
+class Readout(Numbers):
     """Readout time of a rolling shutter, or factor of the line rates of a scanner.
 
     Parameters
@@ -106,7 +98,6 @@ class Readout(_Scalar):
     KIND = "readout"
 
     value: float = 1.0
-    sd: ArrayLike = np.inf
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,16 +165,6 @@ def increasing(name: str, values: ArrayLike) -> Floats:
         row = int(np.argmin(later))
         raise kind_error(f"{name}[{row}]", "a finite time after the previous one", float(times[row]))
     return times
-
-
-def rotations(name: str, values: ArrayLike, count: int) -> Floats:
-    """Return validated rotation matrices (count, 3, 3)."""
-    matrices = shaped(name, values, (count, 3, 3))
-    bad = ~are_rotations(matrices)
-    if bad.any():
-        row = int(np.argmax(bad))
-        raise kind_error(f"{name}[{row}]", ROTATION, matrices[row].tolist())
-    return matrices
 
 
 @dataclass(frozen=True)

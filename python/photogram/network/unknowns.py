@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from photogram import _photocore
 from photogram.arguments.arrays import argument_error, names, number, shaped
 from photogram.arguments.fields import check_fields
-from photogram.arguments.objects import require
+from photogram.arguments.objects import kind_error, require
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -36,11 +36,12 @@ def are_rotations(matrices: Floats) -> Bools:
     return np.asarray((apart < _ORTHONORMAL) & (np.linalg.det(matrices) > 0))
 
 
-def rotation(name: str, value: ArrayLike) -> Floats:
-    """Return a rotation matrix (3, 3); InputError if it is mirrored or not orthonormal to 1e-6."""
-    matrix = shaped(name, value, (3, 3))
-    require(are_rotations(matrix), name, "kind", kind=ROTATION, value=matrix.tolist())
-    return matrix
+def rotations(name: str, values: ArrayLike, *count: int) -> Floats:
+    """Return rotation matrices (*count, 3, 3); InputError if one is mirrored or not orthonormal to 1e-6."""
+    matrices = shaped(name, values, (*count, 3, 3))
+    for place in np.argwhere(~are_rotations(matrices)).tolist()[:1]:
+        raise kind_error(f"{name}{place or ''}", ROTATION, matrices[tuple(place)].tolist())
+    return matrices
 
 
 @cache
@@ -74,6 +75,7 @@ class Unknown:
     GIVEN: ClassVar[tuple[str, ...]] = ()
     """Fields of the initial values; all of them may be None if they are unknown."""
     _PLACE: ClassVar[str] = "through"  # Field of the position
+    _TURN: ClassVar[str] = ""  # Field of the rotation matrix
     _VALUES: ClassVar[slice] = slice(0)
     """Elements of the position that are the values of the first components; the others are changes."""
 
@@ -84,6 +86,7 @@ class Unknown:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", names(f"name of a {self.KIND}", [self.name])[0])
+        check_fields(self, self.title)
         self._set("position", self._position())
         self._set("attitude", self._attitude())
         sd: Any = getattr(self, "sd")  # noqa: B009
@@ -115,7 +118,8 @@ class Unknown:
         return shaped(f"{self._PLACE} of {self.title}", value, (3,))
 
     def _attitude(self) -> Floats:
-        return np.eye(3)
+        value = getattr(self, self._TURN, None)
+        return np.eye(3) if value is None else rotations(f"{self._TURN} of {self.title}", value)
 
     @property
     def title(self) -> str:
@@ -217,10 +221,6 @@ class Drift(Numbers):
 
     epoch: float | None = field(default=None, metadata={"check": partial(number, rule="finite")})
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_fields(self, self.title)
-
 
 @dataclass(frozen=True, eq=False)
 class Boresight(Unknown):
@@ -238,6 +238,7 @@ class Boresight(Unknown):
     """
 
     KIND = "boresight"
+    _TURN = "value"
 
     value: ArrayLike | None = None
     sd: ArrayLike = np.inf
@@ -249,9 +250,6 @@ class Boresight(Unknown):
 
     def _position(self) -> Floats:
         return np.zeros(3)
-
-    def _attitude(self) -> Floats:
-        return np.eye(3) if self.value is None else rotation(f"value of {self.title}", self.value)
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,8 +274,7 @@ class Instrument(Unknown):
     sd: ArrayLike = np.inf
 
     def _position(self) -> Floats:
-        scale = number(f"scale of {self.title}", self.scale)
-        return np.array([scale, number(f"constant of {self.title}", self.constant), 0.0])
+        return np.array([self.scale, self.constant, 0.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,8 +300,7 @@ class Level(Unknown):
     sd: ArrayLike = np.inf
 
     def _position(self) -> Floats:
-        height = 0.0 if self.height is None else number(f"height of {self.title}", self.height)
-        return np.array([0.0, 0.0, height])
+        return np.array([0.0, 0.0, self.height or 0.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -408,14 +404,11 @@ class Sensor(Unknown):
     KIND = "sensor"
     _VALUES = slice(3)
     GIVEN = ("value", "matrix")
-    _PLACE = "value"
+    _PLACE, _TURN = "value", "matrix"
 
     value: ArrayLike | None = None
     matrix: ArrayLike | None = None
     sd: ArrayLike = np.inf
-
-    def _attitude(self) -> Floats:
-        return np.eye(3) if self.matrix is None else rotation(f"matrix of {self.title}", self.matrix)
 
     @classmethod
     def from_colmap(
@@ -425,7 +418,7 @@ class Sensor(Unknown):
 
         A = F R' F and c = -F R' t with F = diag(1, -1, -1).
         """
-        turned = rotation(f"matrix of sensor {name}", matrix).T
+        turned = rotations(f"matrix of sensor {name}", matrix).T
         flip = np.diag([1.0, -1.0, -1.0])
         value = -flip @ turned @ shaped(f"translation of sensor {name}", translation, (3,))
         return cls(name, value, flip @ turned @ flip, sd)

@@ -20,8 +20,8 @@ from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network import geometry
 from photogram.network.block import Block
-from photogram.network.hull import hull
 from photogram.network.motion import on_shared, timed_images
+from photogram.network.point_sets import hull
 from photogram.network.rays import local_axes
 from photogram.network.trajectories import Readout
 from photogram.results.evaluation import evaluated

@@ -20,7 +20,6 @@ from photogram.network import (
     lens,
     moving_photos,
     refraction,
-    rigs,
 )
 from photogram.network import trajectories as motion
 from photogram.network.motion import scanners
@@ -130,7 +129,7 @@ def _named(kind: str, names: list[str], rows: np.ndarray) -> Column:
 
 MODULES = (
     *(cameras, core_arrays, films, frame, geometry, lens, motion, moving_photos),
-    *(refraction, rigs, datum, features, parts),
+    *(refraction, datum, features, parts),
 )
 CLASSES = (Message, Phrase, Removed, Undetermined)
 

@@ -16,7 +16,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block, position_columns
-from photogram.network.tables import ATTITUDE_COLUMNS
+from photogram.network.block_checks import ATTITUDE_COLUMNS
 from photogram.words import phrase
 
 if TYPE_CHECKING:

@@ -18,10 +18,10 @@ from photogram.errors import AdjustmentError, InputError, failure_of_core
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.network.block import Block
+from photogram.network.block_checks import ATTITUDE_COLUMNS
 from photogram.network.datum import DatumRow
 from photogram.network.observations import Distance, EqualHeight, OnPlumbLine
 from photogram.network.observations.points import Control
-from photogram.network.tables import ATTITUDE_COLUMNS
 from photogram.network.trajectories import RotationCoefficient
 from photogram.results.covariance import Failure, photo_components
 from photogram.words import Phrase, phrase

@@ -18,10 +18,9 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.block import Block
-from photogram.network.directions import seen_without_lenses
+from photogram.network.equivalent_cameras import calibration_words
 from photogram.network.motion import focal_images
-from photogram.network.rays import Rays
-from photogram.network.wider_models import calibration_words
+from photogram.network.rays import Rays, seen_without_lenses
 from photogram.results.network import AdjustedNetwork
 from photogram.statistics.findings import Tested
 from photogram.words import Phrase

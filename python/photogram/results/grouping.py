@@ -21,11 +21,10 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import by_name
 from photogram.network.block import Block
-from photogram.network.motion import on_shared
+from photogram.network.motion import Given, on_shared
 from photogram.network.observations import moments
+from photogram.network.point_sets import strips_of
 from photogram.network.rays import local_axes
-from photogram.network.strips import strips_of
-from photogram.network.unadjusted import Given
 from photogram.results.datum import point_kinds
 from photogram.results.network import AdjustedNetwork
 from photogram.show.methods import Tabular

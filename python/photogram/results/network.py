@@ -22,7 +22,7 @@ from photogram.errors import AdjustmentError
 from photogram.lazy_dataclasses import dataclass, fields, replace
 from photogram.messages import Message
 from photogram.network.core_arrays import CoreNetwork, CoreOptions
-from photogram.network.unadjusted import Given
+from photogram.network.motion import Given
 from photogram.results.covariance import Adjusted, Covariances, Failure, Propagated, Selection
 from photogram.results.parts import Iteration, Observed
 from photogram.show.methods import Documented, Judged

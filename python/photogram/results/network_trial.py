@@ -14,10 +14,9 @@ from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.block import Block
-from photogram.network.motion import on_shared
+from photogram.network.motion import Given, on_shared
+from photogram.network.point_sets import strips_of
 from photogram.network.rays import local_axes
-from photogram.network.strips import strips_of
-from photogram.network.unadjusted import Given
 from photogram.results.parts import kind_words, named_observation
 from photogram.statistics.findings import Text
 from photogram.statistics.groups import INVISIBLE

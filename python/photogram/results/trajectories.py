@@ -17,9 +17,9 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.geometry import geographic_to_geocentric
-from photogram.network.knots import Knot
 from photogram.network.moving_photos import Timed
 from photogram.network.observations import Observation, Prior, Smoothness
+from photogram.network.passages import Knot
 from photogram.network.projecting import camera_of, projected
 from photogram.network.trajectories import Basis, Coefficient, Polynomial, Trajectory
 from photogram.results.parts import AdjustedUnknown

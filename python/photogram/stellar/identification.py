@@ -18,7 +18,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.network.neighbours import mutually_nearest
+from photogram.network.point_sets import mutually_nearest
 from photogram.stellar.places import apparent_places, sidereal_time
 from photogram.stellar.sky import Site
 from photogram.stellar.sky_calibration import Exposure, project_sky

@@ -12,7 +12,7 @@ import numpy as np
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
-from photogram.network.neighbours import mutually_nearest
+from photogram.network.point_sets import mutually_nearest
 from photogram.stellar.comparison import LEVEL, NOTABLE, fewer_stars, held_out
 from photogram.stellar.identification import (
     ACCEPTED,

@@ -21,7 +21,7 @@ from photogram.io.tree import Tree
 from photogram.io.yaml_text import camera_info, matrix_lines, read_yaml_text
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.cameras import Camera, parameter_names
-from photogram.network.opencv_lens import opencv_lens
+from photogram.network.equivalent_cameras import opencv_lens
 from photogram.stellar.parameters import COMMON, INTERIOR
 from photogram.stellar.sky import TAU
 from photogram.words import phrase

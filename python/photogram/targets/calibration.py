@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, Literal, Self
 
 import numpy as np
@@ -20,8 +21,8 @@ from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.network.block import Block
 from photogram.network.cameras import Camera, images_of
+from photogram.network.moving_photos import Mount
 from photogram.network.passages import Bend, Figure
-from photogram.network.rigs import Mount
 from photogram.network.unknowns import Sensor
 from photogram.results.result import Result
 from photogram.results.snooping_options import SnoopOptions
@@ -365,19 +366,13 @@ class Calibration(Valued, Brief):
         """
         if outliers is not None:
             one_of("outliers", outliers, ("mrcal",))
-        how: dict[str, Any] = {
-            "loss": loss,
-            "threads": threads,
-            "progress": progress,
-            "covariance": "verdict",
-        }
-        start = self
-        rounds = 0
+        solve = partial(adjust, loss=loss, threads=threads, progress=progress, covariance="verdict")
+        start, rounds = self, 0
         while True:
             # Only priors determine knots without image observations.
-            free = None if any(each.knot_unknowns for each in start.cameras) else adjust(start.block(), **how)
+            free = None if any(each.knot_unknowns for each in start.cameras) else solve(start.block())
             if free is None:
-                result = adjust(weighted_block(start), **how, tolerance=SPLINE_TOLERANCE)
+                result = solve(weighted_block(start), tolerance=SPLINE_TOLERANCE)
             elif start.regularise is None:
                 result = free
             else:

@@ -17,7 +17,7 @@ from photogram.arguments.types import Bools, Floats
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.network.cameras import Camera
-from photogram.network.hull import hull, outside
+from photogram.network.point_sets import hull, outside
 from photogram.statistics.distributions import log_chi_square, log_fisher
 from photogram.summaries import Brief, Rows
 from photogram.targets.housing import (
@@ -377,10 +377,8 @@ def _test(
         values, axes = np.linalg.eigh(side.covariance)
         root = axes * np.sqrt(np.maximum(values, 0.0))
         effects.append(side.partials(each, _finite(distances, pixels), datum) @ root)
-    both, vectors = (
-        np.concatenate(effects, axis=2),
-        differences_at(a.camera, b.camera, fitted, pixels, distances),
-    )
+    both = np.concatenate(effects, axis=2)
+    vectors = differences_at(a.camera, b.camera, fitted, pixels, distances)
     known = np.isfinite(vectors).all(axis=1) & np.isfinite(both).all(axis=(1, 2))
     u, s, _ = np.linalg.svd(both[known].reshape(-1, both.shape[2]), full_matrices=False)
     defined = s > RANK_TOLERANCE * s[0]

@@ -241,7 +241,7 @@ def convert_lens(
             size=size,
             unit="m",
             criterion="pixels",
-            fitted=Fitted(found.motion, finite and moving != NO_MOTION, int(np.count_nonzero(near))),
+            fitted=Fitted(found.motion, finite and moving != NO_MOTION),
             columns=columns,
             rows=rows,
             distances=apart,

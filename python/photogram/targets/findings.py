@@ -12,7 +12,7 @@ import numpy as np
 
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.knots import KNOTTED
+from photogram.network.passages import KNOTTED
 from photogram.results.result import Result
 from photogram.statistics.findings import Findings, Systematic
 from photogram.statistics.weight_rules import LARGEST_FACTOR

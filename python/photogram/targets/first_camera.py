@@ -19,7 +19,7 @@ from photogram.messages import Message, Undetermined
 from photogram.network.attitudes import Attitudes
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.network.knots import KNOTTED
+from photogram.network.passages import KNOTTED
 from photogram.targets.lens_fit import KNOTS, fitted, is_perspective, lens_of
 from photogram.targets.sightings import (
     Sightings,

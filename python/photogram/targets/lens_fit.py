@@ -19,7 +19,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import unknown_name
 from photogram.network.cameras import Camera
-from photogram.network.knots import KNOTTED
+from photogram.network.passages import KNOTTED
 from photogram.targets.sightings import nearest_rotations
 from photogram.targets.uncertainty import image_grid
 from photogram.targets.vision import (
@@ -273,7 +273,6 @@ HUBER_THETA_SQUARED = np.radians(5.0) ** 2  # the criterion of mrcal increases m
 class Fitted:
     motion: Floats  # (4, 4) axes of camera a -> axes of camera b; without translation unless finite
     finite: bool  # whether the translation was fitted: all distances are finite
-    points: int  # number of pixels of the fit, counted at every distance
 
 
 def fitted_motion(
@@ -307,7 +306,7 @@ def fitted_motion(
         known = np.isfinite(imaged(b, transformed(motion, towards)).xy).all(axis=1)
         roots = np.linalg.cholesky(weights[known]).transpose(0, 2, 1)
         shown = Points(towards[known], places[known], finite, roots)
-        return Fitted(shown.least(Moved(b, motion), [], free).motion, finite, count)
+        return Fitted(shown.least(Moved(b, motion), [], free).motion, finite)
     for _ in range(MOTION_STEPS):
         moved = transformed(motion, towards)
         by_motion = motion_partials(moved, finite)[:, :, free]
@@ -317,7 +316,7 @@ def fitted_motion(
         turn, shift = np.abs(step[3:]).max(), np.abs(step[:3]).max()
         if turn < MOTION_TOLERANCE and shift < MOTION_TOLERANCE * np.min(distances):
             break
-    return Fitted(motion, finite, count)
+    return Fitted(motion, finite)
 
 
 def _angle_step(moved: Floats, aims: Floats, weights: Floats, by_motion: Floats) -> tuple[Floats, Floats]:

@@ -25,8 +25,8 @@ from photogram.errors import InputError
 from photogram.io.files import read_text
 from photogram.io.places import Place, at_place
 from photogram.network.cameras import Camera
-from photogram.network.knots import KNOTTED
-from photogram.network.opencv_lens import TERMS, opencv_lens
+from photogram.network.equivalent_cameras import TERMS, opencv_lens
+from photogram.network.passages import KNOTTED
 from photogram.targets.board import Board
 from photogram.targets.calibration import Calibration
 from photogram.targets.corner_files import KEY

@@ -18,7 +18,7 @@ from photogram.errors import InputError
 from photogram.io.yaml_text import camera_info, figures, matrix_lines
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.cameras import Camera
-from photogram.network.opencv_lens import TERMS, OpencvLens, opencv_lens
+from photogram.network.equivalent_cameras import TERMS, OpencvLens, opencv_lens
 from photogram.targets.vision import cross_matrices, inverted
 from photogram.words import phrase
 

@@ -15,8 +15,8 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.knots import beyond_knots
 from photogram.network.observations.unknowns import Prior
+from photogram.network.passages import beyond_knots
 from photogram.show.page import (
     Document,
     Drawing,

@@ -14,7 +14,7 @@ from photogram.errors import InputError
 from photogram.io.places import Place, at_place
 from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
-from photogram.network.knots import KNOTTED
+from photogram.network.passages import KNOTTED
 from photogram.targets.board import Board, picture_size, read_board
 from photogram.targets.calibration import Calibration
 from photogram.targets.corner_files import Form, files_at, is_picture, sorted_files

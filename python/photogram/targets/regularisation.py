@@ -24,7 +24,7 @@ import numpy as np
 from photogram.arguments.arrays import argument_error
 from photogram.errors import InputError
 from photogram.network.cameras import Camera
-from photogram.network.knots import KNOTTED
+from photogram.network.passages import KNOTTED
 from photogram.words import phrase
 
 if TYPE_CHECKING:

@@ -14,8 +14,8 @@ from photogram.arguments.arrays import argument_error, shaped, truth_value
 from photogram.arguments.types import Bools, Floats
 from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.hull import hull, outside
-from photogram.network.knots import beyond_knots
+from photogram.network.passages import beyond_knots
+from photogram.network.point_sets import hull, outside
 from photogram.summaries import Brief, Rows
 from photogram.targets.housing import (
     camera_number,

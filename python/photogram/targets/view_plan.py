@@ -14,7 +14,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
-from photogram.network.hull import hull
+from photogram.network.point_sets import hull
 from photogram.show.methods import Documented
 from photogram.show.page import Document, Drawing, Judgement, Layers, Section, Tone
 from photogram.show.quantity import Axis, Quantity, Table, column, members, of_each

@@ -27,7 +27,7 @@ from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
-from photogram.network.rigs import Mount
+from photogram.network.moving_photos import Mount
 from photogram.network.unknowns import Sensor
 from photogram.results.result import Result
 from photogram.words import Phrase, phrase

@@ -24,7 +24,8 @@ from photogram.io.places import at_place, positive
 from photogram.io.tree import Tree
 from photogram.network.lens import Lens, LensModel
 from photogram.network.moving_photos import Lines
-from photogram.network.trajectories import increasing, rotations
+from photogram.network.trajectories import increasing
+from photogram.network.unknowns import rotations
 from photogram.words import Phrase, phrase
 
 _TRANSX = re.compile(r"(INS-?\d+)_TRANSX")

@@ -37,7 +37,7 @@ from photogram.messages import Message
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.observations import Position
-from photogram.network.similarity import similarity
+from photogram.network.point_sets import similarity
 from photogram.network.unknowns import LeverArm, Shift
 from photogram.words import Phrase, option_sd, phrase
 

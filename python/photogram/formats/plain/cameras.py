@@ -22,9 +22,9 @@ from photogram.io.places import Place, at_place, image_size
 from photogram.messages import unknown_name
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
+from photogram.network.equivalent_cameras import focal_length_message, with_one_focal_length
 from photogram.network.moving_photos import LineSensor, Shutter
 from photogram.network.trajectories import Readout
-from photogram.network.wider_models import focal_length_message, with_one_focal_length
 from photogram.words import phrase
 
 if TYPE_CHECKING:

@@ -22,9 +22,8 @@ from photogram.formats.plain.tables import Tables, Transform, check_rows, indice
 from photogram.io.column_table import ColumnTable
 from photogram.io.numbers import scaled
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.network.moving_photos import Timed
+from photogram.network.moving_photos import Mount, Timed
 from photogram.network.observations import Attitude, Observation, Observations
-from photogram.network.rigs import Mount
 from photogram.network.unknowns import Sensor
 from photogram.words import phrase
 

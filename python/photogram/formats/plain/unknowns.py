@@ -33,8 +33,8 @@ from photogram.messages import unknown_name
 from photogram.network import trajectories, unknowns
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.network.knots import Knot
 from photogram.network.observations import Observation, Prior
+from photogram.network.passages import Knot
 from photogram.network.trajectories import GyroBias, RotationCoefficient
 from photogram.network.unknowns import Boresight, Drift, LeverArm, Sensor, Shift, Unknown
 from photogram.words import phrase

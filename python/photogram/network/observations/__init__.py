@@ -11,7 +11,6 @@ from photogram.network.observations.columns import (
     moments,
     of_records,
 )
-from photogram.network.observations.fiducial import FILM, Fiducial, KnownFilm, KnownTogether
 from photogram.network.observations.observation import Observation
 from photogram.network.observations.photos import Attitude, Position, Range, Rate, Relative, Velocity
 from photogram.network.observations.points import (
@@ -24,7 +23,15 @@ from photogram.network.observations.points import (
     OnPlane,
     OnPlumbLine,
 )
-from photogram.network.observations.unknowns import Base, Prior, Smoothness
+from photogram.network.observations.unknowns import (
+    FILM,
+    Base,
+    Fiducial,
+    KnownFilm,
+    KnownTogether,
+    Prior,
+    Smoothness,
+)
 
 __all__ = [
     "FILM",

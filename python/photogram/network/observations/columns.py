@@ -62,7 +62,6 @@ class Columns:
 
     @cached_property
     def objects(self) -> list[Any]:
-        """Observations as objects."""
         return [self._object(values) for values in zip(*self.table.values(), strict=True)]
 
     def _object(self, values: tuple[Any, ...]) -> Any:
@@ -72,18 +71,15 @@ class Columns:
 
     @property
     def first(self) -> Any:
-        """The first observation as an object."""
         return self._object(next(zip(*self.table.values(), strict=False)))
 
     @property
     def names(self) -> list[str]:
-        """Names of the observed items."""
         if self.kind.POINTS:
             return [" - ".join(items) for items in map(add, self.table["points"], self.table["photos"])]
         return [" - ".join(each.of) for each in self.objects]
 
     def numbered(self) -> Iterator[tuple[int, Any]]:
-        """Yield the row numbers and objects."""
         return zip(self.rows.tolist(), self.objects, strict=True)
 
     @property
@@ -93,7 +89,6 @@ class Columns:
 
     @cached_property
     def moments(self) -> list[Moment | None]:
-        """Times on trajectories, instead of photos."""
         none: list[Moment | None] = [None] * len(self.rows)
         if not any(self.table.get("trajectory", none)):
             return none
@@ -229,7 +224,6 @@ def all_trajectories(of_photos: Sequence[Trajectory], observations: Sequence[Any
 
 
 def _moments(observations: Sequence[Any]) -> Iterable[Moment]:
-    """Return the trajectory times of observations."""
     if isinstance(observations, Observations):
         return filter(None, observations.column("moments"))
     return (moment for each in observations if (moment := each.moment) is not None)

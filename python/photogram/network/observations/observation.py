@@ -229,7 +229,6 @@ def _related(kind: type[Observation], count: int, given: Mapping[str, Sequence[A
 
 
 def _distinct(column: Sequence[Any]) -> Iterable[Any]:
-    """Return the different objects of a column."""
     if len(column) < 2 or column.count(column[0]) == len(column):
         return column[:1]
     return {id(value): value for value in column}.values()
@@ -322,7 +321,6 @@ def _rows(name: str, value: Any, shape: tuple[int, ...], count: int | None, *, m
 
 
 def checked_observations(given: object) -> Observations[Observation]:
-    """Return the validated observations of a block."""
     if isinstance(given, Observations):
         return given
     if not isinstance(given, Sequence):

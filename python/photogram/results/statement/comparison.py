@@ -30,8 +30,8 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.messages import unknown_name
 from photogram.network.block import Block
 from photogram.network.geometry import Spheroid, geocentric_to_geographic, lengths_of_units, local_frames
-from photogram.network.hull import hull, outside
 from photogram.network.observations import Control
+from photogram.network.point_sets import hull, outside
 from photogram.network.rays import local_axes
 from photogram.results.covariance import Covariances
 from photogram.results.network_tables import point_axes

@@ -11,7 +11,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import replace
-from photogram.network.hull import hull, outside
+from photogram.network.point_sets import hull, outside
 from photogram.results.distortion import distortion_curve, observed_rows
 from photogram.results.features import quantity_columns, through, unit_deviations
 from photogram.results.footprints import footprints

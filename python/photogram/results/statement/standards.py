@@ -21,7 +21,7 @@ import numpy as np
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import counted
-from photogram.network import hull
+from photogram.network import point_sets
 from photogram.network.observations import Control
 from photogram.results.covariance import used_rows
 from photogram.results.statement import comparison, lengths
@@ -247,7 +247,7 @@ def asprs_figures(
     area, used = asked.area, result.point_positions[result.used_points]
     if area is None:
         used = comparison.plan_positions(result.block, used)
-        area = hull.area(hull.hull(used[:, :2])) if len(used) else 0.0
+        area = point_sets.area(point_sets.hull(used[:, :2])) if len(used) else 0.0
     km2 = area * metre**2 / 1e6
     figures = _accuracies(of_all, of_vegetated)
     classes = asked.classes
