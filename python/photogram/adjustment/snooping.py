@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.a_priori import with_poses
 from photogram.adjustment.adjustment import (
     Progress,
     adjust,
@@ -20,7 +19,7 @@ from photogram.adjustment.adjustment import (
     options_in_datum,
 )
 from photogram.adjustment.exchanged_names import exchanged_names
-from photogram.adjustment.first_features import started
+from photogram.adjustment.first_features import started, with_poses
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.adjustment.options import AdjustOptions
 from photogram.adjustment.remarks import check_cameras

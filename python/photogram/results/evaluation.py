@@ -24,8 +24,7 @@ from photogram.results.network_trial import (
     Out,
     Tests,
 )
-from photogram.results.reliability import Reliability, downweighted
-from photogram.results.reliability_summary import ReliabilitySummary, listed
+from photogram.results.reliability import Reliability, ReliabilitySummary, downweighted, listed
 from photogram.statistics.evidence import MEDIAN
 from photogram.statistics.findings import LARGEST_FACTOR, NOMINAL, Text, TypeFactor
 from photogram.statistics.limits import global_test

@@ -39,8 +39,7 @@ if TYPE_CHECKING:
     from photogram.results.hypotheses import Hypotheses
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.parts import Terms
-    from photogram.results.reliability import Reliability
-    from photogram.results.reliability_summary import ReliabilitySummary
+    from photogram.results.reliability import Reliability, ReliabilitySummary
     from photogram.statistics.findings import Removed
 
 JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
