@@ -99,7 +99,7 @@ def _scaled(observation: Observation, factor: float) -> Observation:
 
 def variance_components(
     network: object,
-    groups: GroupsArgument = "kind",
+    groups: GroupsArgument | Grouping = "kind",
     *,
     held: Sequence[str] = (),
     tolerance: float = 1e-4,
@@ -150,21 +150,6 @@ def variance_components(
     """
     settings = Settings(tolerance, max_steps, least_redundancy, level, equality)
     grouping = grouped(observables(network), groups)
-    given: dict[str, Any] = {"held": held, "probing": probing, "threads": threads}
-    return of_grouping(network, grouping, settings, **given, progress=progress)
-
-
-def of_grouping(
-    network: object,
-    grouping: Grouping,
-    settings: Settings,
-    *,
-    held: Sequence[str] = (),
-    probing: Probing | None = None,
-    threads: int | None = None,
-    progress: Callable[[int, Floats], None] | None = None,
-) -> VarianceComponents:
-    """Estimate the components of numbered groups; see :func:`variance_components`."""
     names = grouping.groups.names
     if unknown := [name for name in held if name not in names]:
         raise InputError(phrase("weighting.unknown-group", group=unknown[0], groups=list(names)))

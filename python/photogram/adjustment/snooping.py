@@ -34,9 +34,8 @@ from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import InnerConstraints
 from photogram.network.motion import timed_photos
 from photogram.network.subset import image_rows, with_rejected_points
-from photogram.results.evaluation import type_factors
+from photogram.results.evaluation import hypotheses, largest_odds, type_factors
 from photogram.results.fixed_tests import held_remark, held_tested
-from photogram.results.hypothesis_tests import hypotheses, largest_odds
 from photogram.results.network import MAX_BIAS_RATIO, AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.network_trial import (

@@ -49,17 +49,8 @@ DETECTION = 0.001, 0.80  # Significance level and power of the MDB
 
 DATUM = frozenset(
     {
-        "control-heights",
-        "control-shift",
-        "control-scale",
-        "control-rotation",
-        "control-set",
-        "gnss-heights",
-        "gnss-shift",
-        "gnss-set",
-        "gnss-half",
-        "distance-scale",
-        "scale",
+        *("control-heights", "control-shift", "control-scale", "control-rotation", "control-set"),
+        *("gnss-heights", "gnss-shift", "gnss-set", "gnss-half", "distance-scale", "scale"),
     }
 )
 """Errors that only change the datum: assumptions, unless independent observations or check points test them.

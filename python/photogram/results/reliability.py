@@ -335,18 +335,8 @@ APART = 1 / (1 + LIMIT)
 """Smallest redundancy that excludes this correlation of a pair: rho^2 <= (1 - r)(1 - s) / (r s)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Listed:
-    """Groups of observations that reports list."""
-
-    kinds: Table  # number, redundancy and checks of groups by type of observation
-    weakest: Table  # of each type the groups with the largest undetected effect
-    two_rays: int  # points on two photos: the wrong image cannot be identified
-    # Inseparable pairs of observations on other points, the most correlated first
-    pairs: tuple[Inseparable, ...]
-    pairs_found: int  # number of these pairs among the examined points
-    # Number of examined points: those with the least redundancy, at most `LOOKED_INTO`
-    points_looked_into: int
+Listed = tuple[list[Part], dict[str, Any]]
+"""Groups of observations in reports: parts of sections, and members of JSON documents."""
 
 
 @dataclass(eq=False)
@@ -381,26 +371,15 @@ class ReliabilitySummary:
         return self.tests.testable(self.suspects.row_starts)
 
     def parts(self) -> list[Part]:
-        listed, sentences = self.listed, list[str]()
-        if listed.two_rays:
-            sentences.append(about("reliability-two-rays", n=listed.two_rays))
-        if listed.pairs:
-            sentences += [about("reliability-pairs"), *map(str, listed.pairs)]
-        if (more := listed.pairs_found - len(listed.pairs)) > 0:
-            sentences.append(about("reliability-more", n=more))
-        sentences = sentences or [about("reliability-separable")]
         found = self.hypotheses
         errors = [found.tests(found.likely), found.external_reliability(found.effective)]
         shown = [replace(table, columns=for_people(table.columns)) for table in errors]
-        return [listed.kinds, listed.weakest, Remarks(sentences), *shown]
+        return [*self.listed[0], *shown]
 
     def document(self) -> dict[str, Any]:
         return {
             **members(self, "level", "power"),
-            **members(self.listed, "points_looked_into"),
-            **members(self.listed, points_on_two_photos="two_rays", inseparable_found="pairs_found"),
-            "unit_weight": "known" if self.known else "unknown",
-            "inseparable": [members(pair, "first", "second", "correlation") for pair in self.listed.pairs],
+            **self.listed[1],
             "hypotheses": self.hypotheses.document(),
         }
 
@@ -423,14 +402,20 @@ def listed(found: Reliability, unit: str, *, heights: bool) -> Listed:
     # Rounding does not define an order: equal values remain in the order of their numbers.
     order = np.lexsort((second, first, -np.round(rho, 9)))[:PAIRS]
     named = zip(*(each[order].tolist() for each in (first, second, rho)), strict=True)
-    return Listed(
-        kinds=_kinds(found),
-        weakest=_weakest(found, unit, heights=heights),
-        two_rays=int(two.sum()),
-        pairs=tuple(found.named(*pair) for pair in named),
-        pairs_found=len(rho),
-        points_looked_into=len(points),
-    )
+    inseparable, two_rays = [found.named(*pair) for pair in named], int(two.sum())
+    sentences = [about("reliability-two-rays", n=two_rays)] if two_rays else []
+    if inseparable:
+        sentences += [about("reliability-pairs"), *map(str, inseparable)]
+    if (more := len(rho) - len(inseparable)) > 0:
+        sentences.append(about("reliability-more", n=more))
+    remarks = Remarks(sentences or [about("reliability-separable")])
+    return [_kinds(found), _weakest(found, unit, heights=heights), remarks], {
+        "points_looked_into": len(points),
+        "points_on_two_photos": two_rays,
+        "inseparable_found": len(rho),
+        "unit_weight": "known" if found.known else "unknown",
+        "inseparable": [members(pair, "first", "second", "correlation") for pair in inseparable],
+    }
 
 
 def _kinds(found: Reliability) -> Table:

@@ -13,8 +13,7 @@ from photogram.network.refraction import Refraction
 from photogram.results.statement.budget import budget_fields
 from photogram.results.statement.comparison import LEVEL, limit_of
 from photogram.results.statement.figures import Figures, Prediction, Surface
-from photogram.results.statement.lengths import LengthTest
-from photogram.results.statement.standards import Asprs, wording
+from photogram.results.statement.standards import Asprs, LengthTest, wording
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
 from photogram.show.quantity import members
