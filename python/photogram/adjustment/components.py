@@ -303,12 +303,9 @@ def _bins(
     places: Indices = np.searchsorted(edges, values, side="right")
     labels = np.array([f"{place:03d}" for place in places], dtype=object)
     sums = group_sums(result, {"images": labels}, probing=probing)
-    found = []
-    for place in range(count):
-        inside = (places == place) & result.used_images
-        if not inside.any():
-            continue
-        each = sums[f"{place:03d}"]
-        middle = float(np.average(factors[inside]))
-        found.append(Bin.of(each, float(values[inside].mean()), middle))
-    return tuple(found)
+    inside = [(places == place) & result.used_images for place in range(count)]
+    return tuple(
+        Bin.of(sums[f"{place:03d}"], float(values[own].mean()), float(np.average(factors[own])))
+        for place, own in enumerate(inside)
+        if own.any()
+    )

@@ -14,10 +14,11 @@ from photogram.network.block import Block
 from photogram.network.cameras import rays_of_row
 from photogram.network.geometry import Cartesian, photo_axes
 from photogram.network.motion import on_shared, scanners
-from photogram.network.observations import Attitude, Control, Observation, Position
+from photogram.network.observations import Attitude, Observation, Position
 from photogram.network.observations.observation import with_unknowns
 from photogram.network.rays import meet_rays
 from photogram.network.unknowns import Boresight, Level, LeverArm, Line, Plane, PlumbLine, Sensor, Unknown
+from photogram.results.datum import given_control
 from photogram.words import phrase
 
 
@@ -107,10 +108,7 @@ def _take_observations(block: Block, axes: Cartesian, centres: Floats, turned: F
 
 def _control(block: Block, axes: Cartesian) -> tuple[Floats, Floats]:
     """Return positions and standard deviations of control in cartesian axes."""
-    points, sd = block.point_positions.copy(), block.point_sd.copy()
-    for each in block.observations.of_type(Control):
-        row = block._point_rows[each.point]
-        points[row], sd[row] = each.observed, np.sqrt(np.diagonal(each.precision))
+    points, sd = given_control(block)
     held = np.isfinite(sd)
     points[~held.any(axis=1)] = np.nan
     if axes.spheroid is not None:
@@ -257,20 +255,13 @@ def _boresight(sites: _Sites, boresight: Unknown, own: Sequence[Observation]) ->
 
 
 def _sensor(sites: _Sites, sensor: Unknown, own: Sequence[Observation]) -> Unknown:
-    known = sites.known
-    pairs = [
-        (sites.photos[each.frame], sites.photos[each.photo])
-        for each in sites.block.mounts
-        if each.sensor is sensor
-    ]
-    places, turns = [], []
-    for frame, photo in pairs:
+    known, places, turns = sites.known, [], []
+    for each in sites.block.mounts:
+        frame, photo = sites.photos[each.frame], sites.photos[each.photo]
         to_frame = known.attitudes[frame].T
-        place, turn = (
-            to_frame @ (known.positions[photo] - known.positions[frame]),
-            to_frame @ known.attitudes[photo],
-        )
-        if np.isfinite(place).all() and np.isfinite(turn).all():
+        place = to_frame @ (known.positions[photo] - known.positions[frame])
+        turn = to_frame @ known.attitudes[photo]
+        if each.sensor is sensor and np.isfinite(place).all() and np.isfinite(turn).all():
             places.append(place)
             turns.append(turn)
     flown = [each.photo for each in sites.block.timed if each.sensor is sensor]
