@@ -22,6 +22,7 @@ from .adjustment.adjustment import adjust as adjust
 from .adjustment.cleaning import Cleaned as Cleaned
 from .adjustment.cleaning import clean as clean
 from .adjustment.components import variance_components as variance_components
+from .adjustment.components import variance_function as variance_function
 from .adjustment.elimination import eliminate_terms as eliminate_terms
 from .adjustment.first_values import FirstValues as FirstValues
 from .adjustment.first_values import first_values as first_values
@@ -33,7 +34,6 @@ from .adjustment.resection import Pose as Pose
 from .adjustment.resection import Resection as Resection
 from .adjustment.resection import resect as resect
 from .adjustment.snooping import snoop as snoop
-from .adjustment.variance_function import variance_function as variance_function
 from .diagnosis.diagnose import diagnose as diagnose
 from .distributed.adjust import adjust_in_parts as adjust_in_parts
 from .errors import AdjustmentError as AdjustmentError

@@ -15,14 +15,16 @@ from message_codes import nested_codes
 from photogram import InputError
 from photogram.results.statement import standards
 from photogram.results.statement.figures import Figures
-from photogram.results.statement.lengths import (
+from photogram.results.statement.request import Asked
+from photogram.results.statement.standards import (
+    accuracy,
     angle_to_diagonal,
     at_reference,
     length_test,
     measured_lengths,
+    nssda,
+    verdict,
 )
-from photogram.results.statement.request import Asked
-from photogram.results.statement.standards import accuracy, nssda, verdict
 from photogram.show.forms import written
 from photogram.statistics import effective_freedom
 

@@ -24,7 +24,6 @@ from photogram.adjustment.remarks import (
     undetermined,
 )
 from photogram.adjustment.robust import loss_row, remark
-from photogram.adjustment.taking_over import large_turns, stays, taken_over
 from photogram.adjustment.undetermined import beyond_trajectory, in_one_place, undetermined_combinations
 from photogram.arguments.arrays import argument_error, whole_number
 from photogram.arguments.fields import options_of
@@ -46,6 +45,7 @@ from photogram.network.unknowns import Unknown
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused, tested_together
 from photogram.results.parts import Iteration
 from photogram.results.result import Result, dropped_points
+from photogram.results.trajectories import large_turns, stays, taken_over
 from photogram.words import phrase
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.adjustment.components import of_grouping, scaled
+from photogram.adjustment.components import scaled, variance_components
 from photogram.adjustment.snooping import snoop
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
@@ -23,7 +23,7 @@ from photogram.results.snooping_options import SnoopOptions
 from photogram.results.snooping_result import Snooped
 from photogram.show.methods import Documented
 from photogram.show.page import Document, Part, Remarks, Section
-from photogram.statistics.components import WORTH_CHANGING, Settings
+from photogram.statistics.components import WORTH_CHANGING
 from photogram.words import phrase
 
 MOST_ROUNDS = 3  # Maximum number of rounds of components and snooping
@@ -133,8 +133,7 @@ def clean(
     grouping = grouped(observables(network), groups)
     names = grouping.groups.names
     level = changes.get("level", (options or SnoopOptions()).level)
-    settings = Settings(level=level)
-    given: dict[str, Any] = {"held": held, "probing": probing, "threads": threads}
+    given: dict[str, Any] = {"held": held, "probing": probing, "threads": threads, "level": level}
     factors = np.ones(grouping.count)
     snooped = snoop(network, options, threads=threads, **changes)
     test = snooped.result.global_test
@@ -144,7 +143,7 @@ def clean(
     while rounds < MOST_ROUNDS and not settled:
         rounds += 1
         left, own = _left(network, grouping, snooped.result)
-        found = of_grouping(left, own, replace(settings, equality=False), **given)
+        found = variance_components(left, own, equality=False, **given)
         changed = _changed(found, names, factors)
         before = _out(snooped)
         snooped = snoop(scaled(network, grouping, changed), options, threads=threads, **changes)
@@ -152,7 +151,7 @@ def clean(
         factors, settled = changed, stands and before == _out(snooped)
     # Components of the remaining network, with the equality test, are estimated for the report.
     left, own = _left(network, grouping, snooped.result)
-    found = of_grouping(left, own, settings, **given)
+    found = variance_components(left, own, **given)
     return Cleaned(snooped, found, names, factors, rounds, settled)
 
 

@@ -43,18 +43,10 @@ class Elimination:
         """Return removed terms with reasons, then the remaining terms."""
         codes = ["improbable" if not each.probability < self.level else "small" for each in self.removed]
         rows = [*zip(codes, self.removed, strict=True), *(("kept", each) for each in self.kept)]
+        names = ("names", "camera", "probability", "effect")
+        fields = [{"level": self.level, **{name: getattr(each, name) for name in names}} for _, each in rows]
         return [
-            str(
-                phrase(
-                    f"elimination.{code}",
-                    names=each.names,
-                    camera=each.camera,
-                    probability=each.probability,
-                    level=self.level,
-                    effect=each.effect,
-                )
-            )
-            for code, each in rows
+            str(phrase(f"elimination.{code}", **own)) for (code, _), own in zip(rows, fields, strict=True)
         ]
 
 

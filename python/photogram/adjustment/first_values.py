@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
-from photogram.adjustment.a_priori import Known, with_poses
 from photogram.adjustment.adjustment import adjust
+from photogram.adjustment.first_features import Known, with_poses
 from photogram.arguments.arrays import truth_value
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from photogram.adjustment.a_priori import Known
 from photogram.adjustment.adjustment import adjust
+from photogram.adjustment.first_features import Known
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.arguments.types import Bools
 from photogram.errors import AdjustmentError

@@ -405,17 +405,14 @@ def _messages(solution: _photocore.ResectionSolution, spheroid: Spheroid | None)
         reason = phrase(f"resection.{solution.undetermined}")
         messages.append(phrase("resection.undetermined-alternative", reason=reason))
     outside = solution.outside_danger_cylinder
-    if outside is not None and abs(outside) < DOUBTFUL * _largest_position_sd(solution, spheroid):
-        messages.append(phrase("resection.near-cylinder", distance=abs(outside), limit=DOUBTFUL))
+    if outside is not None:
+        # Position in the linear unit, with a-priori weight
+        axes = [spheroid.a * np.cos(solution.pose[1]), spheroid.a, 1.0] if spheroid else [1.0, 1.0, 1.0]
+        cofactors = solution.cofactors[:3, :3] * np.outer(axes, axes)
+        known = np.isfinite(cofactors).all()
+        largest = math.sqrt(float(np.linalg.eigvalsh(cofactors)[-1])) if known else math.inf
+        if abs(outside) < DOUBTFUL * largest:
+            messages.append(phrase("resection.near-cylinder", distance=abs(outside), limit=DOUBTFUL))
     if solution.degrees_of_freedom == 0:
         messages.append(phrase("resection.no-redundancy"))
     return [Message(message) for message in messages]
-
-
-def _largest_position_sd(solution: _photocore.ResectionSolution, spheroid: Spheroid | None) -> float:
-    """Return the maximum standard deviation of the position in the linear unit (a-priori weight)."""
-    metric = (
-        np.ones(3) if spheroid is None else np.array([spheroid.a * np.cos(solution.pose[1]), spheroid.a, 1.0])
-    )
-    cofactors = solution.cofactors[:3, :3] * np.outer(metric, metric)
-    return math.sqrt(float(np.linalg.eigvalsh(cofactors)[-1])) if np.isfinite(cofactors).all() else math.inf

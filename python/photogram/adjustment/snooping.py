@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.a_priori import with_poses
 from photogram.adjustment.adjustment import (
     Progress,
     adjust,
@@ -20,7 +19,7 @@ from photogram.adjustment.adjustment import (
     options_in_datum,
 )
 from photogram.adjustment.exchanged_names import exchanged_names
-from photogram.adjustment.first_features import started
+from photogram.adjustment.first_features import started, with_poses
 from photogram.adjustment.first_values import FirstValues, first_values
 from photogram.adjustment.options import AdjustOptions
 from photogram.adjustment.remarks import check_cameras
@@ -34,9 +33,8 @@ from photogram.network.block import Block, checked
 from photogram.network.core_arrays import CoreOptions, block_network
 from photogram.network.datum import InnerConstraints
 from photogram.network.motion import image_rows, timed_photos, with_rejected_points
-from photogram.results.evaluation import type_factors
+from photogram.results.evaluation import hypotheses, largest_odds, type_factors
 from photogram.results.fixed_tests import held_remark, held_tested
-from photogram.results.hypothesis_tests import hypotheses, largest_odds
 from photogram.results.network import MAX_BIAS_RATIO, AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.network_trial import (

@@ -23,12 +23,10 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    import pandas as pd
-
+    from photogram import _photocore
     from photogram.collection import Collection
     from photogram.io.writing import Content
     from photogram.results.parts import Terms
-    from photogram.results.reliability_summary import ReliabilitySummary
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
@@ -157,11 +155,6 @@ class AdjustedCollection(AdjustedNetwork):
 
         return collection_findings(self)
 
-    def _table(self, what: str) -> pd.DataFrame:
-        from photogram.results.tables import table_frame
-
-        return table_frame(self, what)
-
     def _files(self) -> Mapping[str, Content]:
         from photogram.collection.result_files import collection_files
 
@@ -172,13 +165,6 @@ class AdjustedCollection(AdjustedNetwork):
         from photogram.collection.document import collection_document
 
         return collection_document(self)
-
-    @cached_property
-    def reliability_summary(self) -> ReliabilitySummary | None:
-        """The reliability summary of reports; see `AdjustedNetwork`."""
-        from photogram.results.evaluation import reliability_summary
-
-        return reliability_summary(self)
 
     @property
     def given(self) -> Collection:

@@ -299,6 +299,15 @@ def point_kinds(block: Block) -> NDArray[np.str_]:
     return np.where(held, "control", np.where(known, "check", "pass"))
 
 
+def given_control(block: Block) -> tuple[Floats, Floats]:
+    """Return (n, 3) given positions and standard deviations, also of jointly observed control."""
+    positions, sd = block.point_positions.copy(), block.point_sd.copy()
+    for each in block.observations.of_type(Control):
+        row = block._point_rows[each.point]
+        positions[row], sd[row] = each.observed, np.sqrt(np.diagonal(each.precision))
+    return positions, sd
+
+
 def observed_control(block: Block) -> list[int]:
     """Return the control points with an observed covariance matrix."""
     names = {each.point for each in block.observations.of_type(Control)}

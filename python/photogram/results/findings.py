@@ -14,9 +14,9 @@ from photogram.arguments.arrays import chosen, finite_rows
 from photogram.arguments.types import Floats, Indices
 from photogram.messages import Undetermined
 from photogram.network.block import Block
+from photogram.results.evaluation import largest_odds
 from photogram.results.fixed_tests import held_tested, how_to_calibrate
 from photogram.results.hypotheses import FEWEST
-from photogram.results.hypothesis_tests import largest_odds
 from photogram.results.network import AdjustedNetwork
 from photogram.results.network_tables import point_axes
 from photogram.results.patterns import block_patterns

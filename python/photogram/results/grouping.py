@@ -106,13 +106,15 @@ class Grouping:
         return total[:-1]
 
 
-def grouped(of: Observables, groups: GroupsArgument) -> Grouping:
+def grouped(of: Observables, groups: GroupsArgument | Grouping) -> Grouping:
     """Return groups of observations by bases or labels of the user (docs/weights.md); refuse others.
 
     All bases except `kind` and `component` divide the images only; others are grouped by type. Several bases
     define a group for each combination. Observations without a label (None or an empty text) keep their
     weights.
     """
+    if isinstance(groups, Grouping):
+        return groups
     if isinstance(groups, Mapping):
         labels, parents = _own(of, groups)
     else:

@@ -49,17 +49,8 @@ DETECTION = 0.001, 0.80  # Significance level and power of the MDB
 
 DATUM = frozenset(
     {
-        "control-heights",
-        "control-shift",
-        "control-scale",
-        "control-rotation",
-        "control-set",
-        "gnss-heights",
-        "gnss-shift",
-        "gnss-set",
-        "gnss-half",
-        "distance-scale",
-        "scale",
+        *("control-heights", "control-shift", "control-scale", "control-rotation", "control-set"),
+        *("gnss-heights", "gnss-shift", "gnss-set", "gnss-half", "distance-scale", "scale"),
     }
 )
 """Errors that only change the datum: assumptions, unless independent observations or check points test them.
@@ -350,8 +341,10 @@ class Hypotheses:
 
     def common_errors(self, rivals: float = -math.inf) -> list[Phrase]:
         """Return messages on these errors, the most likely first, then single errors that are as likely."""
-        found = self.common(rivals)
-        return [self._common_error(row, found[0]) for row in (*found, *self._singles(found))]
+        found, level = self.common(rivals), DETECTION[0]
+        likely = self._likely(found[0]) if found else []
+        singles = [row for row in likely if row >= len(self.sets) and self.probability[row] < level]
+        return [self._common_error(row, found[0]) for row in (*found, *singles)]
 
     def _common_error(self, row: int, first: int) -> Phrase:
         named, odds = self.name(row), math.exp(self.log_odds[first] - self.log_odds[row])
@@ -359,13 +352,6 @@ class Hypotheses:
             return phrase("common.single", named=named, odds=odds)
         code = f"common.{'error' if row == first else 'alternative'}{'.checks' * (row in self.relative)}"
         return phrase(code, named=named, size=self._size(row), odds=odds)
-
-    def _singles(self, common: list[int]) -> list[int]:
-        """Return rows of single errors that are as likely as a common error, one of each group."""
-        if not common:
-            return []
-        likely = self._likely(common[0])
-        return [row for row in likely if row >= len(self.sets) and self.probability[row] < DETECTION[0]]
 
     def _likely(self, first: int) -> list[int]:
         """Return rows of errors that are as likely as this one, the most likely first, one of each group."""

@@ -39,8 +39,7 @@ if TYPE_CHECKING:
     from photogram.results.hypotheses import Hypotheses
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.parts import Terms
-    from photogram.results.reliability import Reliability
-    from photogram.results.reliability_summary import ReliabilitySummary
+    from photogram.results.reliability import Reliability, ReliabilitySummary
     from photogram.statistics.findings import Removed
 
 JUDGED = 100_000  # Largest number of images for which `repr` shows the verdict
@@ -314,13 +313,15 @@ class AdjustedNetwork(Valued, Judged, Documented, ABC):
             trial.out = lost.out
         return Reliability(trial, self.covariances, lost, level=level, power=power, unit_weight=unit_weight)
 
-    @property
-    @abstractmethod
+    @cached_property
     def reliability_summary(self) -> ReliabilitySummary | None:
         """The reliability summary of reports, with tests of all groups.
 
         None without redundancy numbers or convergence.
         """
+        from photogram.results.evaluation import reliability_summary
+
+        return reliability_summary(self)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
         """Return additional facts for hypotheses; empty by default."""
@@ -478,9 +479,12 @@ class AdjustedNetwork(Valued, Judged, Documented, ABC):
     @abstractmethod
     def _files(self) -> Mapping[str, Content]: ...
 
-    @abstractmethod
     def _table(self, what: str) -> pd.DataFrame:
         """Return a table by the type of its items."""
+        from photogram.results.tables import TABLES
+        from photogram.show.quantity import Table
+
+        return Table(what, "", TABLES[what](self)).frame()
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values, sd, attitudes in degrees."""

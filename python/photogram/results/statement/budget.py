@@ -42,18 +42,21 @@ EXACT = 5000  # Rows up to which degrees of freedom are computed without estimat
 
 @dataclass(frozen=True)
 class Source:
-    level: str  # `kind`, `strip`, `camera`, `photo`, `point` or `parameter`
-    subject: Phrase | str  # Its name; of parameters as a message
+    level: str  # `kind`, `strip`, `camera`, `photo`, `point`, `parameter` or `observation`
+    subject: Any  # Its name; of parameters as a message, of observations a type, names and a component
     number: int  # Number of rows
     # u_k^2 in the squared unit of the quantity, and its ratio to u^2
     contribution: float
     share: float
+    # A priori standard deviation of an observation, and df/dl: units of the quantity for one of its unit
+    sd: float = math.nan
+    sensitivity: float = math.nan
 
     @property
     def name(self) -> str:
         """Its key; for a parameter its owner's name and its own name."""
-        if isinstance(self.subject, str):
-            return self.subject
+        if not isinstance(self.subject, Phrase):
+            return self.subject if isinstance(self.subject, str) else " ".join(self.subject)
         axis = self.subject.fields.get("axis", self.subject)
         return f"{self.subject.fields.get('name', '')} {axis.code.partition('.')[2]}".strip()
 
@@ -61,16 +64,6 @@ class Source:
     def u(self) -> float:
         """u_k, in the unit of the quantity."""
         return math.sqrt(self.contribution)
-
-
-@dataclass(frozen=True)
-class Single:
-    observation: tuple[str, ...]  # Kind, names, component
-    sd: float  # A priori, in its unit
-    sensitivity: float  # df/dl: units of the quantity for one unit of the observation
-    # As in `Source`
-    contribution: float
-    share: float
 
 
 @dataclass(frozen=True)
@@ -96,7 +89,7 @@ class Budget:
     sd: float
     cofactor: float  # u^2 / s2
     sources: tuple[Source, ...]  # Groups of observations at all levels; those of the level `kind` sum to u^2
-    largest: tuple[Single, ...]  # The five largest single observations
+    largest: tuple[Source, ...]  # The five largest single observations
     freedom: Freedom  # Effective degrees of freedom
     k: float  # The coverage factor (Student, degrees of freedom cut to a whole number) and U = k u
     coverage: float  # The probability of U
@@ -139,15 +132,18 @@ def budgets(
         freedom = freedom_of(squares, variance)
         sources = tuple(Source(*source, source[-1] * share) for source in rows.sources(squares))
         most = np.sort(np.argpartition(-squares, min(LARGEST, len(squares)) - 1)[:LARGEST])
+        most = most[np.argsort(-squares[most], kind="stable")]
+        most = most[squares[most] > 0]
+        own_sd = rows.sd[most]
+        numbers = squares[most], squares[most] * share, own_sd, t[most] / own_sd
         largest = tuple(
-            Single(rows.named(row), float(rows.sd[row]), float(t[row] / rows.sd[row]), own, own * share)
-            for row in most[np.argsort(-squares[most], kind="stable")].tolist()
-            if (own := float(squares[row])) > 0
+            Source("observation", rows.named(row), 1, *own)
+            for row, own in zip(most.tolist(), np.transpose(numbers).tolist(), strict=True)
         )
         k = coverage_factor(coverage, freedom.used)
-        numbers = value, math.sqrt(variance), variance / result.covariance_scale
+        sizes = value, math.sqrt(variance), variance / result.covariance_scale
         names = each.name, each.subject, each.unit
-        found.append(Budget(*names, *numbers, sources, largest, freedom, k, coverage))
+        found.append(Budget(*names, *sizes, sources, largest, freedom, k, coverage))
     return found
 
 

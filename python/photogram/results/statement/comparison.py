@@ -34,6 +34,7 @@ from photogram.network.observations import Control
 from photogram.network.point_sets import hull, outside
 from photogram.network.rays import local_axes
 from photogram.results.covariance import Covariances
+from photogram.results.datum import given_control
 from photogram.results.network_tables import point_axes
 from photogram.results.result import NOT_PHOTOGRAPHED
 from photogram.results.statement.request import METRES, Asked
@@ -247,16 +248,6 @@ def _survey(
         without = [name for name, lacks in zip(names, lacking.tolist(), strict=True) if lacks]
         raise InputError(phrase("request.survey", points=without))
     return np.where(known, own, np.nan)
-
-
-def given_control(block: Block) -> tuple[Floats, Floats]:
-    """Return (n, 3) given positions and standard deviations, also of jointly observed control."""
-    positions, sd = block.point_positions.copy(), block.point_sd.copy()
-    rows = {name: row for row, name in enumerate(block.point_ids)}
-    for each in block.observations.of_type(Control):
-        row = rows[each.point]
-        positions[row], sd[row] = each.position, np.sqrt(np.diag(each.precision))
-    return positions, sd
 
 
 def control_places(block: Block) -> Floats:

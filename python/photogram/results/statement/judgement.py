@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,17 +11,14 @@ import numpy as np
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
 from photogram.results.statement.budget import budget_fields
-from photogram.results.statement.comparison import LEVEL, LeftOut, limit_of
+from photogram.results.statement.comparison import LEVEL, limit_of
 from photogram.results.statement.figures import Figures, Prediction, Surface
-from photogram.results.statement.lengths import LengthTest
-from photogram.results.statement.standards import Asprs, wording
+from photogram.results.statement.standards import Asprs, LengthTest, wording
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Tone
 from photogram.show.quantity import members
 from photogram.statistics.distributions import critical_normal
 from photogram.statistics.freedom import root_mean
-from photogram.statistics.verdict import Rule, fitting_rules
-from photogram.words import Phrase
 
 if TYPE_CHECKING:
     from photogram import Result, Statement
@@ -54,72 +51,46 @@ class Judged:
     remarks: list[str]  # Messages that do not change the exit code
 
 
-@dataclass(frozen=True)
-class _Evidence:
-    found: Statement
-    control: Sequence[LeftOut]  # Control points that disagree with the rest of the block
-    classes: Sequence[str]  # Verdicts on accuracy classes
-    # Names of true facts: differences at check points are `high` or `low`, the required accuracy of lengths
-    # is `met` or `missed`, `lengths` disagree with their standard deviations; `warning` of the adjustment
-    facts: frozenset[str]
-
-
-def _rule(name: str, holds: Callable[[_Evidence], bool], exit_code: int = 0) -> Rule:
-    def message(e: _Evidence) -> Phrase | None:
-        if not holds(e):
-            return None
-        fields = {
-            "verdict": e.found.texts.text(e.found.result.verdict.message),
-            "points": e.found.texts.listed([each.point for each in e.control], NAMED),
-            "n": 0 if e.found.of_all is None else e.found.of_all.n,
-        }
-        return Phrase(f"headline.{name}", fields)
-
-    return Rule(name, message, exit_code, grave=lambda e: e.found.strict or name != "low")
-
-
-RULES = (
-    _rule("verdict", lambda e: not e.found.result.verdict.usable, NOT_USABLE),
-    _rule("missed", lambda e: "missed" in (*e.classes, *e.facts), NOT_USABLE),
-    _rule("high", lambda e: "high" in e.facts, NOT_USABLE),
-    _rule("unchecked", lambda e: e.found.result.verdict.code == "accepted-not-checked", NOT_USABLE),
-    _rule("warning", lambda e: e.found.strict and "warning" in e.facts, NOT_USABLE),
-    _rule("control", lambda e: e.found.strict and bool(e.control), NOT_USABLE),
-    _rule("lengths", lambda e: e.found.strict and "lengths" in e.facts, NOT_USABLE),
-    _rule("low", lambda e: "low" in e.facts, NOT_USABLE),
-    _rule("none", lambda e: e.found.of_all is None and ("met" not in e.facts or "not tested" in e.classes)),
-    _rule("found", lambda e: not {"not decided", "not tested"}.isdisjoint(e.classes)),
-    _rule("produced", lambda e: "produced to meet" in e.classes),
-    _rule("met", lambda e: bool(e.classes) or "met" in e.facts),
-    _rule("found", lambda _: True),
-)
-"""The rules of a statement; the first true one gives the headline and the exit code."""
-
-
 def judged(found: Statement) -> Judged:
-    texts, asprs, test = found.texts, found.standards.asprs, found.standards.lengths
-    whole = None if test is None else test.together
-    overall = found.of_all and _whole(found.of_all)
+    texts, asprs, test, of_all = found.texts, found.standards.asprs, found.standards.lengths, found.of_all
+    verdict, strict, whole = found.result.verdict, found.strict, None if test is None else test.together
+    overall = of_all and _whole(of_all)
     side = overall and overall.rejected
-    holds = {
-        "high": side == "high",
-        "low": side == "low",
-        "missed": test is not None and test.met is False,
-        "met": test is not None and bool(test.met),
-        "lengths": whole is not None and (whole.rejected_high or whole.rejected_low),
-        "warning": found.result.verdict.warning,
-    }
-    facts = frozenset(name for name, fact in holds.items() if fact)
+    met = test is not None and bool(test.met)
+    lengths = whole is not None and (whole.rejected_high or whole.rejected_low)
     control = [each for each in found.left_out if each.p < limit_of(found.left_out)]
-    classes = [] if asprs is None else [*asprs.verdicts.values()]
-    _, headline, exit_code = fitting_rules(RULES, _Evidence(found, control, classes, facts))[0]
+    classes = set[str]() if asprs is None else {*asprs.verdicts.values()}
+    # The first true rule gives the headline; those of `grave` also the exit code.
+    grave = {
+        "verdict": not verdict.usable,
+        "missed": "missed" in classes or (test is not None and test.met is False),
+        "high": side == "high",
+        "unchecked": verdict.code == "accepted-not-checked",
+        "warning": strict and verdict.warning,
+        "control": strict and bool(control),
+        "lengths": strict and lengths,
+        "low": side == "low",
+    }
+    others = {
+        "none": of_all is None and (not met or "not tested" in classes),
+        "found": not classes.isdisjoint({"not decided", "not tested"}),
+        "produced": "produced to meet" in classes,
+        "met": bool(classes) or met,
+    }
+    name = next((name for name, holds in (grave | others).items() if holds), "found")
+    exit_code = NOT_USABLE if name in grave and (strict or name != "low") else 0
+    headline = {
+        "verdict": texts.text(verdict.message),
+        "points": texts.listed([each.point for each in control], NAMED),
+        "n": 0 if of_all is None else of_all.n,
+    }
     remarks = [texts(code, **fields) for code, fields in _remarks(found)]
     remarks += [texts("control.wrong", point=each.point, p=each.p) for each in control[:NAMED]]
-    doubtful = bool(control) or not facts.isdisjoint({"warning", "low", "lengths"}) or _doubtful(found.of_all)
+    doubtful = bool(control) or verdict.warning or side == "low" or lengths or _doubtful(of_all)
     return Judged(
         exit=exit_code,
         tone="bad" if exit_code else "look" if remarks or doubtful else "good",
-        headline=texts(headline.code, **headline.fields),
+        headline=texts(f"headline.{name}", **headline),
         sentences=[
             (code, texts(code, **fields))
             for part in (_asprs, _nssda, _lengths, _honest)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -18,11 +19,11 @@ from photogram.results.footprints import footprints
 from photogram.results.network_sections import fit_of_images
 from photogram.results.parts import AdjustedCamera
 from photogram.results.statement import tables as declared
-from photogram.results.statement.budget import Budget, budget_fields
+from photogram.results.statement.budget import Budget, Source, budget_fields
 from photogram.results.statement.comparison import Compared, control_places, in_order
 from photogram.results.statement.figures import Figures
 from photogram.results.statement.judgement import fixed_values
-from photogram.results.statement.lengths import LengthTest
+from photogram.results.statement.standards import LengthTest
 from photogram.results.statement.texts import Texts
 from photogram.show.judgement import verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Judgement, Part, Remarks, Section, Text
@@ -88,26 +89,23 @@ def _budget(texts: Texts, own: Budget) -> list[Table]:
     names = [texts.kind(each.name) for each in kinds]
     names += [f"– {texts(f'level.{each.level}', name=each.subject)}" for each in finer]
 
-    def shares(u: list[float], share: list[float]) -> list[Quantity]:
-        percent = [100 * each for each in share]
-        number = columns.number("u", u, unit=own.unit, figures=2)
-        return [number, columns.number("share", percent, 1, "%")]
+    def shares(rows: Sequence[Source]) -> list[Quantity]:
+        number = columns.number("u", [each.u for each in rows], unit=own.unit, figures=2)
+        return [number, columns.number("share", [100 * each.share for each in rows], 1, "%")]
 
     tables = [
         [
             columns.text("source", names),
             columns.number("number", [each.number for each in sources]),
-            *shares([each.u for each in sources], [each.share for each in sources]),
+            *shares(sources),
             columns.number("dof", [*dof, *blank], 1),
             columns.text("from", [*origins, *[""] * len(finer)]),
         ],
         [
-            columns.text("observation", [texts.observation(each.observation) for each in own.largest]),
+            columns.text("observation", [texts.observation(each.subject) for each in own.largest]),
             columns.number("sd", [each.sd for each in own.largest]),
             columns.number("sensitivity", [each.sensitivity for each in own.largest]),
-            *shares(
-                [math.sqrt(each.contribution) for each in own.largest], [each.share for each in own.largest]
-            ),
+            *shares(own.largest),
         ],
     ]
     titles = texts("budget.line", **budget_fields(texts, own)), texts("table.single", quantity=own.subject)

@@ -8,33 +8,174 @@ statement gives the radius of 95 % of errors with the matrix of mean products. N
 For the ASPRS standards, Edition 2 (2023; Version 2, 2024), section 2.2 lists confirmations by other texts and
 open checks against the standard. Differences contain the errors of the product and of the check survey. The
 standard adds the errors of the survey again: correct for common errors, otherwise conservative.
+
+Measured lengths are tested against calibrated ones by VDI/VDE 2634 part 1 (section 2.5 of the specification):
+at least seven lines with at least five lengths each. Every error is within E = A + K L, at most the user's
+limit B. The longest length is at least two thirds of the diagonal of the volume, and a line is along one.
 """
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.arguments.types import Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import counted
 from photogram.network import point_sets
 from photogram.network.observations import Control
 from photogram.results.covariance import used_rows
-from photogram.results.statement import comparison, lengths
+from photogram.results.statement import comparison
 from photogram.results.statement.figures import Figures
-from photogram.results.statement.lengths import LengthTest
-from photogram.results.statement.request import Asked, lengths_in
+from photogram.results.statement.request import Asked, invalid, lengths_in
 from photogram.show.quantity import members
 from photogram.show.sketch.marks import ellipse_axes
+from photogram.statistics.agreement import agreement
 from photogram.statistics.error_radii import circular_error
 from photogram.statistics.freedom import rmse_interval, root_mean
+from photogram.statistics.limits import GlobalTest
 
 if TYPE_CHECKING:
     from photogram import Result
+
+LINES, LENGTHS, LONGEST = 7, 5, 2 / 3
+"""Requirements: lines, lengths on each, and the longest of all over the diagonal of the volume."""
+ALONG = math.radians(15.0)  # Largest angle between a line and a diagonal of the volume
+REFERENCE = 20.0  # Temperature of calibrated lengths, degrees Celsius
+
+
+@dataclass(frozen=True, eq=False)
+class LengthTest:
+    """m measured lengths against calibrated ones."""
+
+    names: Sequence[str]  # (m,) of their lines
+    calibrated: Floats  # (m,)
+    errors: Floats  # (m,) measured minus calibrated
+    sd: Floats  # (m,) their standard deviations, with those of the calibration
+    limit: tuple[float, float, float] | None  # A, K and B of the limits of errors; B may be infinite
+    # Test of all errors with their joint covariance; None without rank
+    together: GlobalTest | None
+    # The longest calibrated length over the diagonal of the volume; NaN if unknown
+    longest: float
+    # Smallest angle between a length and a diagonal of the volume, radians; NaN if unknown
+    off_diagonal: float
+    ends: Sequence[tuple[str, str]] = ()  # (m,) names of both points
+    expansion: float | None = None  # Of the reduction to 20 degrees; None without
+
+    @property
+    def normalised(self) -> Floats:
+        """(m,) errors / sd; NaN if the standard deviation is zero."""
+        out = np.full(self.errors.shape, math.nan)
+        return np.asarray(np.divide(self.errors, self.sd, out=out, where=self.sd > 0))
+
+    @property
+    def limits(self) -> Floats | None:
+        """(m,) limits of the errors."""
+        constant, slope, most = self.limit or (0.0, 0.0, 0.0)
+        return None if self.limit is None else np.minimum(constant + slope * self.calibrated, most)
+
+    @property
+    def lines(self) -> int:
+        return len(set(self.names))
+
+    @property
+    def least(self) -> int:
+        """Number of lengths on the line with the fewest."""
+        return min(Counter(self.names).values())
+
+    @property
+    def largest(self) -> float:
+        return float(np.abs(self.errors).max())
+
+    @property
+    def rms(self) -> float:
+        return math.sqrt(float(np.mean(self.errors**2)))
+
+    @property
+    def within(self) -> Bools | None:
+        """(m,) whether errors are within their limits; None without limits."""
+        return None if self.limits is None else np.asarray(np.abs(self.errors) <= self.limits)
+
+    @property
+    def met(self) -> bool | None:
+        """Whether every error is within its limit; None without limits."""
+        return None if self.within is None else bool(self.within.all())
+
+    @property
+    def enough(self) -> bool:
+        """Whether there are enough lines, and lengths on each."""
+        return self.lines >= LINES and self.least >= LENGTHS
+
+    @property
+    def long_enough(self) -> bool:
+        """Whether the longest length is at least two thirds of the diagonal, if known."""
+        return not self.longest < LONGEST * (1 - 1e-9)
+
+    @property
+    def along_diagonal(self) -> bool:
+        """Whether a line is along a diagonal of the volume, if known."""
+        return not self.off_diagonal > ALONG
+
+
+def measured_lengths(positions: Floats, joint: Floats, pairs: Indices) -> tuple[Floats, Floats]:
+    """Return (m,) distances of `pairs` of (p, 3) positions, and their joint covariance J C J'."""
+    first, second = pairs.T
+    steps = positions[second] - positions[first]
+    found = np.linalg.norm(steps, axis=1)
+    if not (found > 0).all():
+        raise invalid(f"lengths[{np.argmin(found > 0)}]", "request.identical-positions")
+    along, rows = steps / found[:, np.newaxis], np.arange(len(pairs))
+    gradient = np.zeros((len(pairs), *positions.shape))
+    gradient[rows, second] += along
+    gradient[rows, first] -= along
+    flat = gradient.reshape(len(pairs), -1)
+    return found, np.asarray(flat @ joint @ flat.T)
+
+
+def angle_to_diagonal(steps: Floats, extent: Floats) -> float:
+    """Return the smallest angle (radians) of (m, 3) non-zero steps to box diagonals."""
+    sizes = np.linalg.norm(steps, axis=1) * float(np.linalg.norm(extent))
+    # The nearest of the four diagonals has the component signs of the step.
+    return math.acos(min(float((np.abs(steps) @ np.abs(extent) / sizes).max()), 1.0))
+
+
+def at_reference(lengths: Floats, temperatures: Floats, expansion: float) -> Floats:
+    """Return (m,) lengths at 20 degrees from others (deg C); `expansion` per kelvin: 11.5e-6 for steel."""
+    grown = 1 + expansion * (temperatures - REFERENCE)
+    if not (np.isfinite(grown) & (grown > 0)).all():
+        raise invalid("expansion", "request.expansion", expansion)
+    return lengths / grown
+
+
+def length_test(
+    measured: Floats,
+    calibrated: Floats,
+    *,
+    covariance: Floats,
+    sd: Floats,
+    lines: Sequence[str],
+    limit: tuple[float, float, float] | None = None,
+    diagonal: float = math.nan,
+    off_diagonal: float = math.nan,
+    freedom: float = math.inf,
+) -> LengthTest:
+    """Test (m,) measured lengths against calibrated ones, both at 20 degrees.
+
+    `covariance` is the (m, m) matrix of the measured lengths (:func:`measured_lengths`), `sd` are (m,)
+    standard deviations of the calibrated ones, `lines` (m,) names of their lines. `limit` are A, K and B (may
+    be infinite) of error limits A + K L, at most B. `diagonal` and `off_diagonal` belong to the measured
+    volume: its diagonal, and the smallest angle between a length and it; NaN if unknown. `freedom` are
+    degrees of freedom of the estimated unit weight of the covariance.
+    """
+    errors = measured - calibrated
+    found = agreement(errors[:, np.newaxis], covariance, sd[:, np.newaxis, np.newaxis] ** 2, second=freedom)
+    parts = lines, calibrated, errors, found.sd[:, 0], limit, found.together
+    return LengthTest(*parts, float(calibrated.max()) / diagonal, off_diagonal)
+
 
 ASPRS_POINTS = 30  # Check points of a tested product (7.13); with fewer it is produced to meet a class
 MOST_STEPS = 10  # Number of steps of 1,000 km2, after which the number of check points is constant
@@ -153,8 +294,6 @@ MEASURES = {
     "ellipse": (50, "uncertainty ellipse"),
 }
 Measure = tuple[str, str, Any, str]  # Key of `MEASURES`, element, value and scope
-_METRES_OF = {"h": "class_h_m", "v": "class_v_m", "3d": "class_3d_m"}
-_NAMES = {"h": "horizontal", "v": "vertical", "3d": "three_d"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,9 +307,8 @@ class Asprs:
     # Square kilometres; number of check points that the standard requires
     area: float
     points_asked: int
-    survey_good_enough: Mapping[
-        str, bool
-    ]  # Whether the survey has half of the classes (7.12), by `h` and `v`
+    # Whether the survey has half of the classes (7.12), by `h` and `v`
+    survey_good_enough: Mapping[str, bool]
     control_limits: Mapping[str, float]
     # Root mean squares of the standard deviations of control, radial in plan, and in height; linear unit
     control_rmse: Mapping[str, float]
@@ -181,20 +319,6 @@ class Asprs:
     def control_good_enough(self) -> dict[str, bool]:
         """Whether control is accurate enough for the classes, by `h` and `v`."""
         return {name: self.control_rmse[name] <= limit for name, limit in self.control_limits.items()}
-
-    def member(self, asked: Asked, metre: float) -> dict[str, Any]:
-        found: dict[str, Any] = dict.fromkeys(_METRES_OF.values())
-        found |= {_METRES_OF[name]: size * metre for name, size in asked.classes.items()}
-        for name, each in self.figures.items():
-            found |= {f"upper_{name}": each and each.upper, f"rmse_{name}": each and each.rmse}
-        found |= {own: self.verdicts.get(name) for name, own in _NAMES.items()}
-        return found | {
-            **members(self, "words", "survey_good_enough", "control_good_enough", "control_rmse"),
-            "enough_points": self.words == "tested",
-            "points_asked_for": {f"{self.area:g} km2": self.points_asked},
-            "remarks": [vars(each) for each in self.remarks],
-            "leave_one_out": self.leave_one_out,
-        }
 
 
 @dataclass(frozen=True)
@@ -324,14 +448,14 @@ def tested_lengths(result: Result, asked: Asked) -> LengthTest:
         joint = comparison.turned_jointly(comparison.turned_to_east(block, positions), joint)
         positions = comparison.plan_positions(block, positions)
     pairs = np.array([[names.index(each["from"]), names.index(each["to"])] for each in asked.lengths])
-    measured, covariance = lengths.measured_lengths(positions, joint, pairs)
+    measured, covariance = measured_lengths(positions, joint, pairs)
     temperatures = np.array([each.get("temperature", math.nan) for each in asked.lengths], dtype=float)
-    turned = asked.expansion is not None and bool(np.isfinite(temperatures).all())
-    if turned and asked.expansion is not None:
-        measured = lengths.at_reference(measured, temperatures, asked.expansion)
+    expansion = asked.expansion if np.isfinite(temperatures).all() else None
+    if expansion is not None:
+        measured = at_reference(measured, temperatures, expansion)
     extent = np.ptp(comparison.plan_positions(block, result.point_positions[result.used_points]), axis=0)
     ends_in_plan = comparison.plan_positions(block, result.point_positions[rows])[pairs]
-    test = lengths.length_test(
+    test = length_test(
         measured,
         np.array([each["length"] for each in asked.lengths], dtype=float),
         covariance=covariance,
@@ -339,11 +463,11 @@ def tested_lengths(result: Result, asked: Asked) -> LengthTest:
         lines=[str(each["line"]) for each in asked.lengths],
         limit=asked.limit,
         diagonal=float(np.linalg.norm(extent)),
-        off_diagonal=lengths.angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
+        off_diagonal=angle_to_diagonal(ends_in_plan[:, 1] - ends_in_plan[:, 0], extent),
         freedom=result.freedom_of_scale,
     )
     ends = [(str(each["from"]), str(each["to"])) for each in asked.lengths]
-    return replace(test, ends=ends, expansion=asked.expansion if turned else None)
+    return replace(test, ends=ends, expansion=expansion)
 
 
 def iso_measures(of_all: Figures | None, lengths: LengthTest | None) -> list[Measure]:
@@ -351,22 +475,18 @@ def iso_measures(of_all: Figures | None, lengths: LengthTest | None) -> list[Mea
     figures: list[Measure] = []
     if of_all is not None:
         whole = of_all.parts["all"]
+        # Semi-axes of plan errors, and the azimuth of the larger one (rad)
+        semi_axes, angles = ellipse_axes(of_all.moments[np.newaxis])
+        ellipse = [*semi_axes[0].tolist(), math.radians(90.0 - float(angles[0])) % math.pi]
         values: dict[str, Any] = {
             "bias": [None if each is None else each.mean for each in (of_all.parts[part] for part in "enh")],
             "rmse": None if whole is None else whole.rmse,
             "rmse_plan": of_all.rmse["rmse_h1"],
             **{name: of_all.of_moments[name] for name in ("ce90", "ce95", "le90", "le95")},
-            "ellipse": _ellipse(of_all.moments),
+            "ellipse": ellipse if np.isfinite(ellipse).all() else None,
         }
         scope = counted(of_all.n, "check point")
         figures += [(key, ABSOLUTE, value, scope) for key, value in values.items()]
     if lengths is not None:
         figures.append(("rmse", RELATIVE, lengths.rms, counted(len(lengths.errors), "length")))
     return [own for own in figures if own[2] is not None]
-
-
-def _ellipse(moments: Floats) -> list[float] | None:
-    """Return semi-axes of plan errors, and the larger axis' azimuth (rad)."""
-    semi_axes, angles = ellipse_axes(moments[np.newaxis])
-    found = [*semi_axes[0].tolist(), math.radians(90.0 - float(angles[0])) % math.pi]
-    return found if np.isfinite(found).all() else None

@@ -15,9 +15,8 @@ from photogram.results.grouping import sums_by_kind
 from photogram.results.statement.budget import Budget, kind_of
 from photogram.results.statement.comparison import LeftOut, limit_of
 from photogram.results.statement.figures import Figures, Sized, point_tests
-from photogram.results.statement.lengths import LengthTest
 from photogram.results.statement.request import lengths_in
-from photogram.results.statement.standards import MEASURES
+from photogram.results.statement.standards import MEASURES, Asprs, LengthTest
 from photogram.results.statement.texts import Texts
 from photogram.show.page import Part, Section, about, decimals_of
 from photogram.show.quantity import Axis, Quantity, Table, column, frame, members, members_of_each
@@ -187,15 +186,11 @@ def files_of_statement(statement: Statement) -> dict[str, bytes]:
     for each in statement.taken_apart:
         head = {"quantity": each.quantity, "unit": each.unit, "value": each.value, "u": each.sd}
         basis = "estimated" if each.freedom.basis == "components" else "given"
-        for own in each.sources:
+        for own in (*each.sources, *each.largest):
             dof = each.freedom.of_kind.get(own.name, math.nan) if own.level == "kind" else math.nan
-            named = basis if own.name in each.freedom.of_kind else "given"
-            found = members(own, "level", "number", "share", source="name", u_k="u")
-            rows.append({**head, **found, "dof": dof, "taken_from": named})
-        for one in each.largest:
-            found = {"level": "observation", "source": " ".join(one.observation), "number": 1}
-            found |= {"u_k": math.sqrt(one.contribution), **members(one, "share", "sensitivity", "sd")}
-            rows.append({**head, **found, "taken_from": basis})
+            known = own.level == "observation" or own.name in each.freedom.of_kind
+            found = members(own, "level", "number", "share", "sensitivity", "sd", source="name", u_k="u")
+            rows.append({**head, **found, "dof": dof, "taken_from": basis if known else "given"})
     budgets = {name: [row.get(name, math.nan) for row in rows] for name in _OF_BUDGET}
     files = {
         "check_points.csv": csv_text(columns, [about("statement.check-points", unit=unit)]),
@@ -236,7 +231,7 @@ def statement_members(found: Statement) -> dict[str, Any]:
             for name, code in found.compared.not_usable
         ],
         "budgets": {each.quantity: budget_member(each) for each in found.taken_apart},
-        "asprs": None if standards.asprs is None else standards.asprs.member(asked, lengths_in(unit)),
+        "asprs": standards.asprs and _asprs(standards.asprs, asked.classes, lengths_in(unit)),
         "nssda": standards.nssda_member if "nssda" in asked.standards else None,
         "lengths": standards.lengths and _lengths(standards.lengths),
         "iso_19157": None,
@@ -332,7 +327,10 @@ def budget_member(found: Budget) -> dict[str, Any]:
                 ("camera_by_parameter", "parameter"),
             )
         },
-        "largest": [vars(each) for each in found.largest],
+        "largest": [
+            members(each, observation="subject") | members(each, "sd", "sensitivity", "contribution", "share")
+            for each in found.largest
+        ],
         "degrees_of_freedom": {
             "basis": freedom.basis,
             "used": freedom.used if math.isfinite(freedom.used) else None,
@@ -346,6 +344,23 @@ def budget_member(found: Budget) -> dict[str, Any]:
                 for what, nu in own
             },
         },
+    }
+
+
+def _asprs(found: Asprs, classes: Mapping[str, float], metre: float) -> dict[str, Any]:
+    names = {"h": "horizontal", "v": "vertical", "3d": "three_d"}
+    own: dict[str, Any] = {
+        f"class_{name}_m": classes[name] * metre if name in classes else None for name in names
+    }
+    for name, each in found.figures.items():
+        own |= {f"upper_{name}": each and each.upper, f"rmse_{name}": each and each.rmse}
+    own |= {member: found.verdicts.get(name) for name, member in names.items()}
+    return own | {
+        **members(found, "words", "survey_good_enough", "control_good_enough", "control_rmse"),
+        "enough_points": found.words == "tested",
+        "points_asked_for": {f"{found.area:g} km2": found.points_asked},
+        "remarks": [vars(each) for each in found.remarks],
+        "leave_one_out": found.leave_one_out,
     }
 
 
