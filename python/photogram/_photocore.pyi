@@ -6,7 +6,7 @@ lengths in the linear unit of the object space. All functions release the GIL.
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, TypedDict, final
+from typing import Any, Final, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -1005,43 +1005,28 @@ class Node:
     of threads. `threads` and `progress` are as in :class:`BlockNetwork`.
     """
 
-    @property
-    def size(self) -> int:
-        """N, the number of unknowns in a state."""
+    size: Final[int]
+    """N, the number of unknowns in a state."""
+    outer: Final[_Indices]
+    """(S,) indices of the outer unknowns in a state, block by block in their order."""
+    children: Final[list[_Indices]]
+    """For each child (S_c,) indices of the unknowns of its contribution in a state, in its order."""
+    unknown_names: Final[_Indices]
+    """(N, 3) type of the owner of each unknown, index of the owner, and index of the unknown.
 
-    @property
-    def outer(self) -> _Indices:
-        """(S,) indices of the outer unknowns in a state, block by block in their order."""
+    Types: 0 photo, 1 shared camera, 2 shared unknown, 3 point.
+    """
+    counts: Final[tuple[int, int, int]]
+    """Observations, weighted unknowns, unknowns that are not fixed; without outer unknowns."""
+    dropped: Final[list[tuple[int, str]]]
+    """Excluded points, with the codes of the reasons."""
+    initial: Final[_Floats]
+    """(N,) initial state: given photos, points at the intersection of their rays here.
 
-    @property
-    def children(self) -> list[_Indices]:
-        """For each child (S_c,) indices of the unknowns of its contribution in a state, in its order."""
-
-    @property
-    def unknown_names(self) -> _Indices:
-        """(N, 3) type of the owner of each unknown, index of the owner, and index of the unknown.
-
-        Types: 0 photo, 1 shared camera, 2 shared unknown, 3 point.
-        """
-
-    @property
-    def counts(self) -> tuple[int, int, int]:
-        """Observations, weighted unknowns, unknowns that are not fixed; without outer unknowns."""
-
-    @property
-    def dropped(self) -> list[tuple[int, str]]:
-        """Excluded points, with the codes of the reasons."""
-
-    @property
-    def initial(self) -> _Floats:
-        """(N,) initial state: given photos, points at the intersection of their rays here.
-
-        If there are outer points, set the outer part to the values of the node above.
-        """
-
-    @property
-    def converges_linearly(self) -> bool:
-        """Whether photos share free or weighted cameras, so that a final chord helps (docs/adjustment.md)."""
+    If there are outer points, set the outer part to the values of the node above.
+    """
+    converges_linearly: Final[bool]
+    """Whether photos share free or weighted cameras, so that a final chord helps (docs/adjustment.md)."""
 
     def prediction(self, threads: int) -> dict[str, float]:
         """Return the predicted work and memory with a number of threads, from the sparsity pattern.
@@ -1107,30 +1092,23 @@ class FormedNode:
     instead.
     """
 
-    @property
-    def contribution(self) -> ContributionRow:
-        """Contribution to the node above, over the S outer unknowns; empty for the root.
+    contribution: Final[ContributionRow]
+    """Contribution to the node above, over the S outer unknowns; empty for the root.
 
-        `U = A_SS - A_SI A_II^-1 A_IS` (S (S + 1) / 2,), lower triangle, column by column: row i of column j
-        is at `j S - j (j - 1) / 2 + i - j`. `u = b_S - A_SI A_II^-1 b_I` (S,). The diagonal of A_SS before
-        any elimination, also by children (S,), is the reference for small pivots. Available once.
-        """
+    `U = A_SS - A_SI A_II^-1 A_IS` (S (S + 1) / 2,), lower triangle, column by column: row i of column j
+    is at `j S - j (j - 1) / 2 + i - j`. `u = b_S - A_SI A_II^-1 b_I` (S,). The diagonal of A_SS before
+    any elimination, also by children (S,), is the reference for small pivots. Available once.
+    """
+    sum_of_squares: Final[float]
+    """Weighted sum of squares of own observations at this state; the total is over all nodes."""
+    decrease: Final[float]
+    """Decrease of the sum of squares by a full step, as far as known here.
 
-    @property
-    def sum_of_squares(self) -> float:
-        """Weighted sum of squares of own observations at this state; the total is over all nodes."""
-
-    @property
-    def decrease(self) -> float:
-        """Decrease of the sum of squares by a full step, as far as known here.
-
-        The sum over all nodes applies to the block. Its root is an upper bound of the change of any unknown,
-        in standard deviations (the largest change of an iteration).
-        """
-
-    @property
-    def undetermined(self) -> FailureRow | None:
-        """Undetermined unknowns of the node, as in :class:`BlockError`; or None."""
+    The sum over all nodes applies to the block. Its root is an upper bound of the change of any unknown,
+    in standard deviations (the largest change of an iteration).
+    """
+    undetermined: Final[FailureRow | None]
+    """Undetermined unknowns of the node, as in :class:`BlockError`; or None."""
 
     def solve(
         self,
@@ -1140,9 +1118,8 @@ class FormedNode:
     ) -> _Floats:
         """Return the step (N,) of all unknowns from the step of the outer ones (S,)."""
 
-    @property
-    def has_chord(self) -> bool:
-        """Whether the right-hand side of a chord was reduced but not yet solved."""
+    has_chord: Final[bool]
+    """Whether the right-hand side of a chord was reduced but not yet solved."""
 
     def reduce_chord(
         self,
@@ -1236,24 +1213,17 @@ class NetworkSuspects:
     observed values of cameras and shared unknowns. Each group has rows, M in total, stored group by group.
     """
 
-    @property
-    def subjects(self) -> tuple[NDArray[np.uint8], _Indices]:
-        """(G,) types, and indices of image, point, photo, observation, camera or shared unknown.
+    subjects: Final[tuple[NDArray[np.uint8], _Indices]]
+    """(G,) types, and indices of image, point, photo, observation, camera or shared unknown.
 
-        Types are 0 image, 1 control, 2 position, 3 attitude, 4 observation, 5 camera, 6 shared unknown.
-        """
-
-    @property
-    def row_starts(self) -> _Indices:
-        """(G + 1,) first row of each group."""
-
-    @property
-    def components(self) -> _Indices:
-        """(M,) component of each row."""
-
-    @property
-    def deviations(self) -> _Floats:
-        """(M,) a-priori standard deviations, in the units of the observations."""
+    Types are 0 image, 1 control, 2 position, 3 attitude, 4 observation, 5 camera, 6 shared unknown.
+    """
+    row_starts: Final[_Indices]
+    """(G + 1,) first row of each group."""
+    components: Final[_Indices]
+    """(M,) component of each row."""
+    deviations: Final[_Floats]
+    """(M,) a-priori standard deviations, in the units of the observations."""
 
 @final
 class NetworkSnooping:
@@ -1305,9 +1275,8 @@ class NetworkSnooping:
             (P,) whether the pose of each photo is determined without images.
         """
 
-    @property
-    def needs_consensus(self) -> bool:
-        """Whether the adjustment diverges, or residuals exceed plausible sizes."""
+    needs_consensus: Final[bool]
+    """Whether the adjustment diverges, or residuals exceed plausible sizes."""
 
     def may_have_common_errors(self, trial: NetworkTrial) -> bool:
         """Return whether the residuals are too large before any removal."""
@@ -1342,17 +1311,12 @@ class NetworkTrial:
     `undetermined photos` if the removals leave these without support.
     """
 
-    @property
-    def suspects(self) -> NetworkSuspects:
-        """Groups of observations that can be removed."""
-
-    @property
-    def photos(self) -> list[list[float]]:
-        """Values of each photo after the last trial, in the input format, pose first."""
-
-    @property
-    def points(self) -> _Floats:
-        """(n, 3) point coordinates after the last trial; NaN for removed points."""
+    suspects: Final[NetworkSuspects]
+    """Groups of observations that can be removed."""
+    photos: Final[list[list[float]]]
+    """Values of each photo after the last trial, in the input format, pose first."""
+    points: Final[_Floats]
+    """(n, 3) point coordinates after the last trial; NaN for removed points."""
 
     def stand(self) -> tuple[str, int, float, int, list[int]]:
         """Restore the adjusted state with all observations; return the same as `adjust`."""
@@ -1621,175 +1585,102 @@ class _NetworkSolution:
     in the input units. Excluded points and images are NaN. Cofactors refer to a-priori unit weight.
     """
 
-    @property
-    def status(self) -> str:
-        """`converged`, `not converged` or `diverged`."""
+    status: Final[str]
+    """`converged`, `not converged` or `diverged`."""
+    weak_points: Final[list[tuple[int, float, float]]]
+    """Points with nearly parallel rays, or at the position of a station.
 
-    @property
-    def weak_points(self) -> list[tuple[int, float, float]]:
-        """Points with nearly parallel rays, or at the position of a station.
+    For each its index, the ratio of its largest to its smallest standard deviation (in any directions;
+    infinite if the smallest is lost by rounding, NaN without cofactors), and its distance from the
+    nearest station that observes it, relative to the median of these distances.
+    """
+    weak: Final[list[tuple[int, int]]]
+    """Photos and their unknowns in a combination that no step could follow.
 
-        For each its index, the ratio of its largest to its smallest standard deviation (in any directions;
-        infinite if the smallest is lost by rounding, NaN without cofactors), and its distance from the
-        nearest station that observes it, relative to the median of these distances.
-        """
+    The sum of squares was nevertheless stationary, or the iterations were exhausted. Empty otherwise.
+    """
+    state: Final[BlockState]
+    """Final state of the adjustment."""
+    initial_sum_of_squares: Final[float]
+    """Weighted sum of squares, or of losses, at the initial values."""
+    iterations: Final[list[IterationRow]]
+    """All iterations."""
+    photo_cofactors: Final[_Floats]
+    """(P, k, k): position and attitude, or vector and translation, then the camera."""
+    photo_redundancy: Final[_Floats]
+    """(P, k) redundancy numbers of the observed unknowns; 0 unless weighted."""
+    point_positions: Final[_Floats]
+    """(n, 3) X, Y, Z, or longitude (rad), latitude (rad), height."""
+    point_cofactors: Final[_Floats]
+    """(n, 3, 3) cofactors of the points."""
+    point_redundancy: Final[_Floats]
+    """(n, 3) redundancy numbers of the observed coordinates; 0 unless weighted."""
+    point_rays: Final[_Indices]
+    """(n,) number of images; 0 for excluded points."""
+    residuals: Final[_Floats]
+    """(m, 2) observed minus computed, in the image unit."""
+    redundancy: Final[_Floats]
+    """(m, 2) redundancy numbers."""
+    standardized: Final[_Floats]
+    """(m, 2) residual / (standard deviation x root of redundancy number), a-priori unit weight.
 
-    @property
-    def weak(self) -> list[tuple[int, int]]:
-        """Photos and their unknowns in a combination that no step could follow.
+    NaN without redundancy.
+    """
+    image_weights: Final[_Floats]
+    """(m,) factor of the weight by a loss; 1 without a loss."""
+    undetermined: Final[FailureRow | None]
+    """Reason for missing cofactors, as in :class:`BlockError`."""
+    redundancy_excess: Final[float | None]
+    """Sum of all redundancy numbers minus the degrees of freedom: rounding errors.
 
-        The sum of squares was nevertheless stationary, or the iterations were exhausted. Empty otherwise.
-        """
-
-    @property
-    def state(self) -> BlockState:
-        """Final state of the adjustment."""
-
-    @property
-    def initial_sum_of_squares(self) -> float:
-        """Weighted sum of squares, or of losses, at the initial values."""
-
-    @property
-    def iterations(self) -> list[IterationRow]:
-        """All iterations."""
-
-    @property
-    def photo_cofactors(self) -> _Floats:
-        """(P, k, k): position and attitude, or vector and translation, then the camera."""
-
-    @property
-    def photo_redundancy(self) -> _Floats:
-        """(P, k) redundancy numbers of the observed unknowns; 0 unless weighted."""
-
-    @property
-    def point_positions(self) -> _Floats:
-        """(n, 3) X, Y, Z, or longitude (rad), latitude (rad), height."""
-
-    @property
-    def point_cofactors(self) -> _Floats:
-        """(n, 3, 3) cofactors of the points."""
-
-    @property
-    def point_redundancy(self) -> _Floats:
-        """(n, 3) redundancy numbers of the observed coordinates; 0 unless weighted."""
-
-    @property
-    def point_rays(self) -> _Indices:
-        """(n,) number of images; 0 for excluded points."""
-
-    @property
-    def residuals(self) -> _Floats:
-        """(m, 2) observed minus computed, in the image unit."""
-
-    @property
-    def redundancy(self) -> _Floats:
-        """(m, 2) redundancy numbers."""
-
-    @property
-    def standardized(self) -> _Floats:
-        """(m, 2) residual / (standard deviation x root of redundancy number), a-priori unit weight.
-
-        NaN without redundancy.
-        """
-
-    @property
-    def image_weights(self) -> _Floats:
-        """(m,) factor of the weight by a loss; 1 without a loss."""
-
-    @property
-    def undetermined(self) -> FailureRow | None:
-        """Reason for missing cofactors, as in :class:`BlockError`."""
-
-    @property
-    def redundancy_excess(self) -> float | None:
-        """Sum of all redundancy numbers minus the degrees of freedom: rounding errors.
-
-        None without cofactors, and with a loss.
-        """
-
-    @property
-    def variance_of_unit_weight(self) -> float | None:
-        """Variance of unit weight; None without degrees of freedom."""
-
-    @property
-    def counts(self) -> tuple[int, int, int]:
-        """Observations, weighted unknowns, unknowns that are not fixed."""
-
-    @property
-    def ordering(self) -> str:
-        """Name of the ordering in use."""
-
-    @property
-    def predictions(self) -> dict[str, float]:
-        """Predicted multiply-adds of one factorisation in each tested ordering; NaN if it failed."""
-
-    @property
-    def operations(self) -> dict[str, float]:
-        """Predicted multiply-adds of `reduction`, `factor` and `inverse`, per execution."""
-
-    @property
-    def formations(self) -> int:
-        """Number of formations of the normal equations."""
-
-    @property
-    def seconds(self) -> dict[str, float]:
-        """Seconds in `form`, `factor`, `solve`, `invert` and `cofactors`, over all iterations."""
+    None without cofactors, and with a loss.
+    """
+    variance_of_unit_weight: Final[float | None]
+    """Variance of unit weight; None without degrees of freedom."""
+    counts: Final[tuple[int, int, int]]
+    """Observations, weighted unknowns, unknowns that are not fixed."""
+    ordering: Final[str]
+    """Name of the ordering in use."""
+    predictions: Final[dict[str, float]]
+    """Predicted multiply-adds of one factorisation in each tested ordering; NaN if it failed."""
+    operations: Final[dict[str, float]]
+    """Predicted multiply-adds of `reduction`, `factor` and `inverse`, per execution."""
+    formations: Final[int]
+    """Number of formations of the normal equations."""
+    seconds: Final[dict[str, float]]
+    """Seconds in `form`, `factor`, `solve`, `invert` and `cofactors`, over all iterations."""
 
 @final
 class BlockSolution(_NetworkSolution):
     """Adjusted block; k is 6."""
 
-    @property
-    def photo_corrections(self) -> _Floats:
-        """(i, P, 6) corrections of position and attitude in each of i iterations, in their units."""
+    photo_corrections: Final[_Floats]
+    """(i, P, 6) corrections of position and attitude in each of i iterations, in their units."""
+    photo_positions: Final[_Floats]
+    """(P, 3) X, Y, Z, or longitude (rad), latitude (rad), height."""
+    photo_attitudes: Final[_Floats]
+    """(P, 3) omega, phi, kappa in radians."""
+    point_last_corrections: Final[_Floats]
+    """(n, 3) corrections in the last iteration, in the units of the values."""
+    images_behind: Final[_Indices]
+    """Indices of the images with a point behind the camera, ascending."""
+    images_folded: Final[_Indices]
+    """Indices of the images outside the one-to-one range of the lens, ascending."""
+    loose_photos: Final[list[int]]
+    """Indices of the photos that were not adjusted because their images do not determine them."""
+    datum: Final[list[tuple[int, int]]]
+    """Photos and their unknowns (0 to 5) that are fixed to define a datum.
 
-    @property
-    def photo_positions(self) -> _Floats:
-        """(P, 3) X, Y, Z, or longitude (rad), latitude (rad), height."""
-
-    @property
-    def photo_attitudes(self) -> _Floats:
-        """(P, 3) omega, phi, kappa in radians."""
-
-    @property
-    def point_last_corrections(self) -> _Floats:
-        """(n, 3) corrections in the last iteration, in the units of the values."""
-
-    @property
-    def images_behind(self) -> _Indices:
-        """Indices of the images with a point behind the camera, ascending."""
-
-    @property
-    def images_folded(self) -> _Indices:
-        """Indices of the images outside the one-to-one range of the lens, ascending."""
-
-    @property
-    def loose_photos(self) -> list[int]:
-        """Indices of the photos that were not adjusted because their images do not determine them."""
-
-    @property
-    def datum(self) -> list[tuple[int, int]]:
-        """Photos and their unknowns (0 to 5) that are fixed to define a datum.
-
-        Empty if observations and weights define one.
-        """
-
-    @property
-    def datum_unknowns(self) -> list[tuple[int, int]]:
-        """Coefficients of trajectories fixed to define a datum: shared unknowns and components."""
-
-    @property
-    def relative_error(self) -> float:
-        """Approximate relative error of the variances in the new datum, by rounding."""
-
-    @property
-    def minimal_control(self) -> bool:
-        """Whether control and weights of poses are exactly minimal for a datum."""
-
-    @property
-    def weak_unknowns(self) -> list[tuple[int, int]]:
-        """Shared unknowns and their components, as in `weak`."""
-
+    Empty if observations and weights define one.
+    """
+    datum_unknowns: Final[list[tuple[int, int]]]
+    """Coefficients of trajectories fixed to define a datum: shared unknowns and components."""
+    relative_error: Final[float]
+    """Approximate relative error of the variances in the new datum, by rounding."""
+    minimal_control: Final[bool]
+    """Whether control and weights of poses are exactly minimal for a datum."""
+    weak_unknowns: Final[list[tuple[int, int]]]
+    """Shared unknowns and their components, as in `weak`."""
     @property
     def adjusted_unknowns(
         self,
@@ -1801,42 +1692,27 @@ class BlockSolution(_NetworkSolution):
         first), redundancy numbers, and the number of observations and images.
         """
 
-    @property
-    def weak_cameras(self) -> list[tuple[int, int]]:
-        """Shared cameras and their parameters, as in `weak`."""
+    weak_cameras: Final[list[tuple[int, int]]]
+    """Shared cameras and their parameters, as in `weak`."""
+    cameras: Final[list[CameraRow]]
+    """Adjusted cameras, in the input order."""
+    dropped: Final[list[tuple[int, str]]]
+    """Excluded points, with the codes of the reasons."""
+    sums_of_squares: Final[tuple[float, float, float, float]]
+    """Weighted sums of squares: photos, control, image coordinates, additional observations."""
+    redundancies: Final[tuple[float, float, float, float] | None]
+    """Sums of the redundancy numbers of the same types; None without covariances."""
+    adjusted_observations: Final[tuple[_Indices, _Floats, _Floats]]
+    """Results of the n observations, in the order of the groups.
 
-    @property
-    def cameras(self) -> list[CameraRow]:
-        """Adjusted cameras, in the input order."""
-
-    @property
-    def dropped(self) -> list[tuple[int, str]]:
-        """Excluded points, with the codes of the reasons."""
-
-    @property
-    def sums_of_squares(self) -> tuple[float, float, float, float]:
-        """Weighted sums of squares: photos, control, image coordinates, additional observations."""
-
-    @property
-    def redundancies(self) -> tuple[float, float, float, float] | None:
-        """Sums of the redundancy numbers of the same types; None without covariances."""
-
-    @property
-    def adjusted_observations(self) -> tuple[_Indices, _Floats, _Floats]:
-        """Results of the n observations, in the order of the groups.
-
-        (n,) numbers of components, zero for observations of excluded points; (3, r) residuals, redundancy
-        numbers and standardized residuals of all components in sequence, in the units of their types; (2, n)
-        weighted squares, and factors of the weights by a loss, NaN for observations of excluded points.
-        """
-
-    @property
-    def degrees_of_freedom(self) -> int:
-        """Degrees of freedom for the selected unit variance."""
-
-    @property
-    def photo_order(self) -> _Indices:
-        """(P,) indices of the photos in elimination order."""
+    (n,) numbers of components, zero for observations of excluded points; (3, r) residuals, redundancy
+    numbers and standardized residuals of all components in sequence, in the units of their types; (2, n)
+    weighted squares, and factors of the weights by a loss, NaN for observations of excluded points.
+    """
+    degrees_of_freedom: Final[int]
+    """Degrees of freedom for the selected unit variance."""
+    photo_order: Final[_Indices]
+    """(P,) indices of the photos in elimination order."""
 
 class ResectionError(Exception):
     """Photo that cannot be resected.
@@ -1906,85 +1782,46 @@ def resect(
 class ResectionSolution:
     """Resected photo with n points. Cofactors refer to a-priori unit weight."""
 
-    @property
-    def status(self) -> str:
-        """`converged`, `not converged` or `diverged`."""
-
-    @property
-    def iterations(self) -> list[IterationRow]:
-        """All iterations."""
-
-    @property
-    def history(self) -> _Floats:
-        """(k, 6) position and attitude after each iteration."""
-
-    @property
-    def start(self) -> _Floats:
-        """(6,) initial pose of the adjustment."""
-
-    @property
-    def pose(self) -> _Floats:
-        """(6,) position, then omega, phi, kappa in radians."""
-
-    @property
-    def cofactors(self) -> _Floats:
-        """(6, 6), in the units of the values; with the criterion `position` before the last correction."""
-
-    @property
-    def pose_redundancy(self) -> _Floats:
-        """(6,) redundancy numbers of observed position and attitude; 0 unless weighted."""
-
-    @property
-    def point_positions(self) -> _Floats:
-        """(n, 3) adjusted control."""
-
-    @property
-    def point_cofactors(self) -> _Floats:
-        """(n, 3, 3) in the units of the values."""
-
-    @property
-    def point_redundancy(self) -> _Floats:
-        """(n, 3) redundancy numbers of control coordinates; 0 unless weighted."""
-
-    @property
-    def residuals(self) -> _Floats:
-        """(n, 2) observed minus computed, millimetres."""
-
-    @property
-    def redundancy(self) -> _Floats:
-        """(n, 2) redundancy numbers."""
-
-    @property
-    def standardized(self) -> _Floats:
-        """(n, 2) residual / (standard deviation x root of redundancy number), a-priori unit weight."""
-
-    @property
-    def partials(self) -> _Floats:
-        """(n, 2, 6) partial derivatives of x and y by position and attitude, at the solution."""
-
-    @property
-    def points_behind(self) -> _Indices:
-        """Indices of the points behind the camera, ascending."""
-
-    @property
-    def sum_of_squares(self) -> float:
-        """Weighted sum of squares."""
-
-    @property
-    def degrees_of_freedom(self) -> int:
-        """Observations and weighted unknowns minus unknowns."""
-
-    @property
-    def alternatives(self) -> list[tuple[list[float], float]]:
-        """Other poses (6 values) with a similar fit, with their sums of squares."""
-
-    @property
-    def undetermined(self) -> str | None:
-        """Reason why another fitting pose is undetermined, a kind as in `ResectionError`; or None."""
-
-    @property
-    def outside_danger_cylinder(self) -> float | None:
-        """Distance of the projection centre from the danger cylinder, negative inside, or None."""
+    status: Final[str]
+    """`converged`, `not converged` or `diverged`."""
+    iterations: Final[list[IterationRow]]
+    """All iterations."""
+    history: Final[_Floats]
+    """(k, 6) position and attitude after each iteration."""
+    start: Final[_Floats]
+    """(6,) initial pose of the adjustment."""
+    pose: Final[_Floats]
+    """(6,) position, then omega, phi, kappa in radians."""
+    cofactors: Final[_Floats]
+    """(6, 6), in the units of the values; with the criterion `position` before the last correction."""
+    pose_redundancy: Final[_Floats]
+    """(6,) redundancy numbers of observed position and attitude; 0 unless weighted."""
+    point_positions: Final[_Floats]
+    """(n, 3) adjusted control."""
+    point_cofactors: Final[_Floats]
+    """(n, 3, 3) in the units of the values."""
+    point_redundancy: Final[_Floats]
+    """(n, 3) redundancy numbers of control coordinates; 0 unless weighted."""
+    residuals: Final[_Floats]
+    """(n, 2) observed minus computed, millimetres."""
+    redundancy: Final[_Floats]
+    """(n, 2) redundancy numbers."""
+    standardized: Final[_Floats]
+    """(n, 2) residual / (standard deviation x root of redundancy number), a-priori unit weight."""
+    partials: Final[_Floats]
+    """(n, 2, 6) partial derivatives of x and y by position and attitude, at the solution."""
+    points_behind: Final[_Indices]
+    """Indices of the points behind the camera, ascending."""
+    sum_of_squares: Final[float]
+    """Weighted sum of squares."""
+    degrees_of_freedom: Final[int]
+    """Observations and weighted unknowns minus unknowns."""
+    alternatives: Final[list[tuple[list[float], float]]]
+    """Other poses (6 values) with a similar fit, with their sums of squares."""
+    undetermined: Final[str | None]
+    """Reason why another fitting pose is undetermined, a kind as in `ResectionError`; or None."""
+    outside_danger_cylinder: Final[float | None]
+    """Distance of the projection centre from the danger cylinder, negative inside, or None."""
 
 class ComparatorError(Exception):
     """Calibration that cannot be adjusted: (message, cases, points), both as indices."""
@@ -1993,57 +1830,32 @@ class ComparatorError(Exception):
 class ComparatorSolution:
     """Adjusted calibration of a comparator. Cofactors refer to a-priori unit weight."""
 
-    @property
-    def converged(self) -> bool:
-        """Whether no unknown changed by more than `limit` of its standard deviation in the last step."""
-
-    @property
-    def iterations(self) -> int:
-        """Number of iterations."""
-
-    @property
-    def comparator(self) -> list[float]:
-        """Scale x, scale y, lack of orthogonality (rad), coefficients of x, of y (unit of the grid)."""
-
-    @property
-    def comparator_cofactors(self) -> _Floats:
-        """(k, k) joint cofactors of these parameters."""
-
-    @property
-    def case_placements(self) -> _Floats:
-        """(q, 3) rotation (rad), and the grid coordinates of the centre of the polynomials."""
-
-    @property
-    def case_cofactors(self) -> _Floats:
-        """(q, 3, 3) cofactors of each case."""
-
-    @property
-    def grid_xy(self) -> _Floats:
-        """(l, 2) adjusted grid coordinates, in the axes of the plate."""
-
-    @property
-    def grid_cofactors(self) -> _Floats:
-        """(l, 2, 2) cofactors of each grid point."""
-
-    @property
-    def grid_redundancy(self) -> _Floats:
-        """(l, 2) redundancy numbers of given grid coordinates; zero for free and fixed ones."""
-
-    @property
-    def residuals(self) -> _Floats:
-        """(m, 2) observed minus computed readings."""
-
-    @property
-    def redundancy(self) -> _Floats:
-        """(m, 2) redundancy numbers of the readings."""
-
-    @property
-    def sum_of_squares(self) -> float:
-        """Weighted sum of squares of readings and weighted grid coordinates."""
-
-    @property
-    def degrees_of_freedom(self) -> int:
-        """Readings and weighted grid coordinates minus unknowns."""
+    converged: Final[bool]
+    """Whether no unknown changed by more than `limit` of its standard deviation in the last step."""
+    iterations: Final[int]
+    """Number of iterations."""
+    comparator: Final[list[float]]
+    """Scale x, scale y, lack of orthogonality (rad), coefficients of x, of y (unit of the grid)."""
+    comparator_cofactors: Final[_Floats]
+    """(k, k) joint cofactors of these parameters."""
+    case_placements: Final[_Floats]
+    """(q, 3) rotation (rad), and the grid coordinates of the centre of the polynomials."""
+    case_cofactors: Final[_Floats]
+    """(q, 3, 3) cofactors of each case."""
+    grid_xy: Final[_Floats]
+    """(l, 2) adjusted grid coordinates, in the axes of the plate."""
+    grid_cofactors: Final[_Floats]
+    """(l, 2, 2) cofactors of each grid point."""
+    grid_redundancy: Final[_Floats]
+    """(l, 2) redundancy numbers of given grid coordinates; zero for free and fixed ones."""
+    residuals: Final[_Floats]
+    """(m, 2) observed minus computed readings."""
+    redundancy: Final[_Floats]
+    """(m, 2) redundancy numbers of the readings."""
+    sum_of_squares: Final[float]
+    """Weighted sum of squares of readings and weighted grid coordinates."""
+    degrees_of_freedom: Final[int]
+    """Readings and weighted grid coordinates minus unknowns."""
 
 def adjust_comparator(
     grid_xy: _Floats,
@@ -2173,80 +1985,45 @@ def orient_model(
 class SimilaritySolution:
     """Oriented model, in the order of its n stations. Cofactors refer to a-priori unit weight."""
 
-    @property
-    def status(self) -> str:
-        """`converged`, `not converged` or `diverged`."""
+    status: Final[str]
+    """`converged`, `not converged` or `diverged`."""
+    started: Final[str]
+    """Source of the initial values: `restart`, `report` or `closed-form`."""
+    similarity: Final[CentredRow]
+    """Adjusted similarity."""
+    initial: Final[CentredRow]
+    """Initial similarity of the iteration."""
+    alternatives: Final[list[CentredRow]]
+    """Other orientations with the same fit."""
+    iterations: Final[list[IterationRow]]
+    """Iterations of the rigorous method; empty for the methods of the report."""
+    cycles: Final[list[float] | None]
+    """Largest correction of an angle (rad) in each cycle of the report's methods, else None."""
+    traces: Final[list[TraceRow]]
+    """Intermediate results of these cycles, if requested."""
+    tangent_cofactors: Final[_Floats]
+    """(7, 7) cofactors of three small rotations about the model axes (rad), s, t."""
+    condition: Final[float]
+    """Condition number of the linearized misclosures."""
+    weakness: Final[tuple[str, list[int]] | None]
+    """Reason for weak control, and the stations concerned.
 
-    @property
-    def started(self) -> str:
-        """Source of the initial values: `restart`, `report` or `closed-form`."""
-
-    @property
-    def similarity(self) -> CentredRow:
-        """Adjusted similarity."""
-
-    @property
-    def initial(self) -> CentredRow:
-        """Initial similarity of the iteration."""
-
-    @property
-    def alternatives(self) -> list[CentredRow]:
-        """Other orientations with the same fit."""
-
-    @property
-    def iterations(self) -> list[IterationRow]:
-        """Iterations of the rigorous method; empty for the methods of the report."""
-
-    @property
-    def cycles(self) -> list[float] | None:
-        """Largest correction of an angle (rad) in each cycle of the report's methods, else None."""
-
-    @property
-    def traces(self) -> list[TraceRow]:
-        """Intermediate results of these cycles, if requested."""
-
-    @property
-    def tangent_cofactors(self) -> _Floats:
-        """(7, 7) cofactors of three small rotations about the model axes (rad), s, t."""
-
-    @property
-    def condition(self) -> float:
-        """Condition number of the linearized misclosures."""
-
-    @property
-    def weakness(self) -> tuple[str, list[int]] | None:
-        """Reason for weak control, and the stations concerned.
-
-        `coincident` (horizontal stations in plan), `elevations in line` (in plan) or `stations in line`.
-        """
-
-    @property
-    def sum_of_squares(self) -> float:
-        """Weighted sum of squares in both systems."""
-
-    @property
-    def misclosures(self) -> _Floats:
-        """(n, 3) s X - A^T (x - B): control axes, model units; NaN if unknown."""
-
-    @property
-    def model_residuals(self) -> _Floats:
-        """(n, 3) s A X + B - x with the adjusted X: model axes, model units."""
-
-    @property
-    def adjusted_control(self) -> _Floats:
-        """(n, 3) adjusted control coordinates, ground units; unknown ones from the model."""
-
-    @property
-    def control_cofactors(self) -> _Floats:
-        """(n, 3, 3) cofactors of the adjusted control coordinates."""
-
-    @property
-    def redundancy(self) -> _Floats:
-        """(n, 3) redundancy numbers of the misclosures; NaN if unknown."""
-
-    @property
-    def standardized(self) -> _Floats:
-        """(n, 3) misclosure / a-priori standard deviation; NaN if unknown or unchecked."""
+    `coincident` (horizontal stations in plan), `elevations in line` (in plan) or `stations in line`.
+    """
+    sum_of_squares: Final[float]
+    """Weighted sum of squares in both systems."""
+    misclosures: Final[_Floats]
+    """(n, 3) s X - A^T (x - B): control axes, model units; NaN if unknown."""
+    model_residuals: Final[_Floats]
+    """(n, 3) s A X + B - x with the adjusted X: model axes, model units."""
+    adjusted_control: Final[_Floats]
+    """(n, 3) adjusted control coordinates, ground units; unknown ones from the model."""
+    control_cofactors: Final[_Floats]
+    """(n, 3, 3) cofactors of the adjusted control coordinates."""
+    redundancy: Final[_Floats]
+    """(n, 3) redundancy numbers of the misclosures; NaN if unknown."""
+    standardized: Final[_Floats]
+    """(n, 3) misclosure / a-priori standard deviation; NaN if unknown or unchecked."""
 
 def transform_points(
     similarity: CentredRow, tangent_covariance: _Floats, points: _Floats, points_sd: _Floats
@@ -2919,38 +2696,21 @@ class CollectionNetwork:
 class CollectionSolution(_NetworkSolution):
     """Adjusted collection; k is 6 plus the number of parameters of a camera."""
 
-    @property
-    def photo_parameters(self) -> _Floats:
-        """(P, k) adjusted parameters, as in the input."""
-
-    @property
-    def photo_images(self) -> _Indices:
-        """(P,) number of used images."""
-
-    @property
-    def point_rays_behind(self) -> _Indices:
-        """(n,) number of images with the point behind the camera."""
-
-    @property
-    def collapsed(self) -> list[int]:
-        """Indices of the points that converged to a station and were excluded."""
-
-    @property
-    def beside_stations(self) -> list[int]:
-        """Indices of the points that are fixed close to a station and were excluded."""
-
-    @property
-    def not_determined(self) -> list[int]:
-        """Indices of the points that were excluded because their rays do not determine them."""
-
-    @property
-    def sum_of_squares(self) -> float:
-        """Weighted sum of squares, with weights modified by the loss."""
-
-    @property
-    def degrees_of_freedom(self) -> int:
-        """Observations and weighted unknowns minus unknowns."""
-
-    @property
-    def datum(self) -> list[tuple[int, int]]:
-        """Photos and parameters fixed to define a datum; empty if observations and weights define one."""
+    photo_parameters: Final[_Floats]
+    """(P, k) adjusted parameters, as in the input."""
+    photo_images: Final[_Indices]
+    """(P,) number of used images."""
+    point_rays_behind: Final[_Indices]
+    """(n,) number of images with the point behind the camera."""
+    collapsed: Final[list[int]]
+    """Indices of the points that converged to a station and were excluded."""
+    beside_stations: Final[list[int]]
+    """Indices of the points that are fixed close to a station and were excluded."""
+    not_determined: Final[list[int]]
+    """Indices of the points that were excluded because their rays do not determine them."""
+    sum_of_squares: Final[float]
+    """Weighted sum of squares, with weights modified by the loss."""
+    degrees_of_freedom: Final[int]
+    """Observations and weighted unknowns minus unknowns."""
+    datum: Final[list[tuple[int, int]]]
+    """Photos and parameters fixed to define a datum; empty if observations and weights define one."""
