@@ -9,7 +9,7 @@ import pytest
 
 from photogram import Camera, adjust, diagnose, first_values, simulate, snoop
 from photogram.adjustment.exchanged_names import exchanged_names
-from photogram.diagnosis import names as names_of_points
+from photogram.diagnosis import after_adjustment
 from photogram.words import Phrase
 
 
@@ -173,11 +173,11 @@ def test_a_pair_of_a_large_block_is_found_among_some_of_its_images(monkeypatch):
         asked.append(len(block.image_xy))
         return first_values(block)
 
-    monkeypatch.setattr(names_of_points, "first_values", counted)
+    monkeypatch.setattr(after_adjustment, "first_values", counted)
     block, names, photo = exchanged(block_of(2).block, 2)
     [pair] = explained(block).exchanged
-    monkeypatch.setattr(names_of_points, "MOST_IMAGES", 100)
-    monkeypatch.setattr(names_of_points, "EACH", 6)
+    monkeypatch.setattr(after_adjustment, "MOST_IMAGES", 100)
+    monkeypatch.setattr(after_adjustment, "EACH", 6)
     assert explained(block).exchanged == (pair,)
     assert {pair.fields["one"], pair.fields["other"]} == set(names)
     assert photo in pair.fields["photos"]
