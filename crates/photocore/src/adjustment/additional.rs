@@ -434,14 +434,15 @@ impl Linearized {
                 part.parameters.iter().zip(own).for_each(|(&parameter, own)| sum[parameter] += own);
             }
         }
-        let columns = rights.transpose();
+        let mut effects = rights.transpose();
         // An even number of equal parts, so that two threads have the same work.
         let together = count.div_ceil(count.div_ceil(SOLVED).next_multiple_of(2).max(1));
-        let some = columns.as_slice().chunks((columns.nrows() * together).max(1)).collect();
+        let length = (effects.nrows() * together).max(1);
         let solve = |rights: &[f64]| self.factor.solve_reduced(rights);
-        let (solved, height) = (threads.install(|| parallel::map_each(some, &solve)), columns.nrows());
-        drop(columns);
-        let effects = DMatrix::from_vec(height, count, solved.concat());
+        let some = effects.as_slice().chunks(length).collect();
+        let solved = threads.install(|| parallel::map_each(some, &solve));
+        let parts = effects.as_mut_slice().chunks_mut(length);
+        parts.zip(solved).for_each(|(part, own)| part.copy_from_slice(&own));
         entries += rights * &effects;
         let redundancy = &squares - (&entries + entries.transpose()) / 2.0;
         Additional { score, squares, redundancy, effects, observations }

@@ -88,9 +88,9 @@ impl Leverages {
         Ok(Cow::Owned(Linearized::form(problem, None, values, held, &mut Context::new(threads))?))
     }
 
-    /// Releases the residuals, the leverage matrices of groups and the inverse, whose memory the next factor takes over.
+    /// Releases the residuals, the largest cofactors and the inverse, whose memory the next factor takes over.
     pub fn release(&mut self, system: &System) {
-        (self.residuals, self.cofactors.groups) = (vec![], None);
+        (self.residuals, self.cofactors.local, self.cofactors.groups) = (vec![], vec![], None);
         system.reuse(&mut self.selected);
     }
 

@@ -317,11 +317,10 @@ impl Trial {
         self.found.as_ref().ok_or(NetworkError::State)
     }
 
-    /// Returns the adjusted network without the data for tests, of which the trial has none afterwards.
+    /// Returns the adjusted network; afterwards the trial has no data for tests and adjustments.
     pub(super) fn end(&mut self) -> Option<Leverages> {
-        let mut found = self.found.take()?;
-        found.release(&self.assembled.problem.system);
-        Some(found)
+        (self.observation_sd, self.sd) = (vec![], vec![]);
+        self.found.take()
     }
 
     /// Returns the prior terms of the parameters, with given standard deviations.

@@ -31,7 +31,6 @@ pub struct Effect {
 /// Points whose changes are computed.
 pub(super) struct Sample<'a> {
     trial: &'a Trial,
-    linearized: &'a Linearized,
     /// Local points of the model, each of which stands for `share` of them.
     locals: Vec<usize>,
     /// How many of them are counted, the first ones.
@@ -51,7 +50,7 @@ pub(super) struct Changes {
 }
 
 impl<'a> Sample<'a> {
-    pub fn new(trial: &'a Trial, found: &Leverages, linearized: &'a Linearized, facts: &'a Facts) -> Self {
+    pub fn new(trial: &'a Trial, found: &Leverages, facts: &'a Facts) -> Self {
         let (model, points) = (&trial.assembled.problem.model, &trial.assembled.points);
         let stride = model.locals.div_ceil(SAMPLE).max(1);
         let mut locals: Vec<usize> = (0..model.locals).step_by(stride).collect();
@@ -72,12 +71,13 @@ impl<'a> Sample<'a> {
         };
         let checks = places.into_iter().map(find).collect();
         let points = locals.iter().copied().chain(model.locals..points.len()).map(of).collect();
-        Self { trial, linearized, locals, counted: interval, share, points, checks, facts }
+        Self { trial, locals, counted: interval, share, points, checks, facts }
     }
 
     /// Changes by errors of parameters whose effects on unknowns that are not local are known.
     pub fn changes(
         &self,
+        linearized: &Linearized,
         parameters: &dyn AdditionalParameters,
         effects: &DMatrix<f64>,
         errors: &[DVector<f64>],
@@ -89,19 +89,15 @@ impl<'a> Sample<'a> {
         let errors = DMatrix::from_columns(errors);
         let others = effects * &errors;
         let problem = &self.trial.assembled.problem;
-        let locals = self.linearized.changes_of_locals(
-            problem,
-            parameters,
-            (others.as_view(), &errors),
-            &self.locals,
-            threads,
-        );
+        let parts = (others.as_view(), &errors);
+        let locals = linearized.changes_of_locals(problem, parameters, parts, &self.locals, threads);
         Changes { locals, others }
     }
 
     /// Changes of the check points by a unit of each of the first parameters: three rows per point, NaN for points that do not take part.
     pub fn at_checks(
         &self,
+        linearized: &Linearized,
         parameters: &dyn AdditionalParameters,
         effects: &DMatrix<f64>,
         count: usize,
@@ -126,7 +122,7 @@ impl<'a> Sample<'a> {
         let (rows, places): (Vec<usize>, Vec<usize>) = locals.into_iter().unzip();
         let problem = &self.trial.assembled.problem;
         let parts = (others, &errors);
-        let changes = self.linearized.changes_of_locals(problem, parameters, parts, &places, threads);
+        let changes = linearized.changes_of_locals(problem, parameters, parts, &places, threads);
         rows.iter().zip(changes).for_each(|(&row, own)| found.rows_mut(row, 3).copy_from(&own.rows(0, 3)));
         found
     }

@@ -52,16 +52,17 @@ impl Trial {
         let criteria = Criteria::new(facts);
         let mut singles = single_errors(self, &criteria, threads);
         let worst = worst(&singles, facts);
-        let ended = if facts.last { self.end() } else { None };
+        let mut ended = if facts.last { self.end() } else { None };
 
         let (this, problem) = (&*self, &self.assembled.problem);
+        let sample = Sample::new(this, ended.as_ref().map_or_else(|| this.found(), Ok)?, facts);
+        ended.iter_mut().for_each(|own| own.release(&problem.system));
         let found = ended.as_ref().map_or_else(|| this.found(), Ok)?;
         let failed = |error| NetworkError::new(error, &this.assembled);
         let linearized = found.linearized(problem, threads).map_err(failed)?;
         if facts.last {
             problem.system.release();
         }
-        let sample = Sample::new(this, found, &linearized, facts);
         let mut catalogue = catalogue(this, found, facts);
         let mut add = |&k: &usize| singles[k].add(&mut catalogue, facts.by_component);
         let shares: Vec<Vec<(usize, f64)>> = worst.iter().map(&mut add).collect();
@@ -69,7 +70,7 @@ impl Trial {
         let count = sums.score.len();
         let of_sets = shares.iter().flatten().map(|own| own.0).min().unwrap_or(count);
         let compared = if facts.by_component { count } else { of_sets };
-        let at_checks = sample.at_checks(&catalogue, &sums.effects, compared, threads);
+        let at_checks = sample.at_checks(&linearized, &catalogue, &sums.effects, compared, threads);
         let (mut all, mut columns, mut errors) = (vec![], vec![], vec![]);
         for cause in &catalogue.causes {
             let sees = |own: &(usize, f64)| sums.squares[(own.0, own.0)] > 0.0;
@@ -118,7 +119,7 @@ impl Trial {
                 singles[k].compare(&at_checks.select_columns(own.iter().map(|own| &own.0)));
             }
         }
-        let changes = sample.changes(&catalogue, &sums.effects, &errors, threads);
+        let changes = sample.changes(&linearized, &catalogue, &sums.effects, &errors, threads);
         let control: Vec<usize> = catalogue.control_points(this).into_iter().map(|own| own.0).collect();
         let effect = |error: usize| {
             let mut own = match error.checked_sub(sets) {
