@@ -2,6 +2,10 @@
 
 Arrays are float64. Unless specified otherwise, angles are in radians, image coordinates in millimetres and
 lengths in the linear unit of the object space. All functions release the GIL.
+
+Every function raises a ValueError if the shape or length of an array, an index, the axes of a spheroid, the
+name of a model, or another choice is invalid; the message names the argument. Sections `Raises` list further
+errors.
 """
 
 from collections.abc import Callable, Sequence
@@ -259,11 +263,6 @@ def camera_images(model: str, parameters: _Floats, u: _Floats, knots: _Floats | 
     Returns
     -------
     (n, 2) in the unit of the camera; not finite if undefined.
-
-    Raises
-    ------
-    ValueError
-        If the model does not exist, or a shape or number of parameters is wrong.
     """
 
 def camera_rays(model: str, parameters: _Floats, xy: _Floats, knots: _Floats | None = None) -> _Floats:
@@ -272,11 +271,6 @@ def camera_rays(model: str, parameters: _Floats, xy: _Floats, knots: _Floats | N
     Returns
     -------
     (n, 3) unit vectors in the axes of the photo, in front of it; NaN if no direction has the image.
-
-    Raises
-    ------
-    ValueError
-        If the model does not exist, or a shape or number of parameters is wrong.
     """
 
 def camera_correct(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
@@ -302,11 +296,6 @@ def camera_partials(
     (n, 2) images, (n, 2, 3) partial derivatives by u, (n, 2, k) by the parameters, 0 for constants of a lens;
     not finite if undefined. For a backward camera, derivatives refer to the measured position that
     corresponds to u.
-
-    Raises
-    ------
-    ValueError
-        If the model does not exist, or a shape or number of parameters is wrong.
     """
 
 def camera_patches(model: str, parameters: _Floats, u: _Floats) -> tuple[_Indices, _Floats]:
@@ -335,11 +324,6 @@ def radial_domain(model: str, parameters: _Floats) -> tuple[float, float] | None
     Returns
     -------
     None if the lens is one-to-one everywhere.
-
-    Raises
-    ------
-    ValueError
-        If the model does not exist, or the number of parameters is wrong.
     """
 
 def attitudes_from_numbers(
@@ -362,11 +346,6 @@ def attitudes_from_numbers(
     -------
     (n, 3, 3) matrices A, photo to object; and K, (n, 3, k), the partial derivatives of the rotation step rho
     by the numbers. A step multiplies A by Exp(rho), about the photo's own axes.
-
-    Raises
-    ------
-    ValueError
-        If a shape or the representation is wrong; the message names the argument.
     """
 
 def numbers_of_attitudes(
@@ -385,11 +364,6 @@ def numbers_of_attitudes(
     -------
     (n, k) numbers, and their partial derivatives by the rotation step, (n, k, 3). If two rotation axes
     coincide, derivatives are NaN and one of the angles is zero.
-
-    Raises
-    ------
-    ValueError
-        If a shape or the representation is wrong; the message names the argument.
     """
 
 def nadir_boresight(quarters: int) -> _Floats:
@@ -412,11 +386,6 @@ def rotation_matrix(angles: _Floats) -> _Floats:
     Returns
     -------
     (n, 3, 3) matrices.
-
-    Raises
-    ------
-    ValueError
-        If a shape is wrong; the message names the argument and its shape.
     """
 
 def rotation_angles(matrices: _Floats) -> _Floats:
@@ -431,11 +400,6 @@ def rotation_angles(matrices: _Floats) -> _Floats:
     -------
     (n, 3) omega and kappa in [-pi, pi], phi in [-pi/2, pi/2], radians. If phi is +-pi/2, only omega + kappa
     or omega - kappa is determined; the returned angles reproduce the matrix.
-
-    Raises
-    ------
-    ValueError
-        If a shape is wrong; the message names the argument and its shape.
     """
 
 def vector_rotations(vectors: _Floats) -> _Floats:
@@ -444,11 +408,6 @@ def vector_rotations(vectors: _Floats) -> _Floats:
     Returns
     -------
     (n, 3, 3) matrices.
-
-    Raises
-    ------
-    ValueError
-        If a shape is wrong; the message names the argument and its shape.
     """
 
 def rotation_vectors(matrices: _Floats) -> _Floats:
@@ -457,11 +416,6 @@ def rotation_vectors(matrices: _Floats) -> _Floats:
     Returns
     -------
     (n, 3) axis times angle, radians, no longer than pi.
-
-    Raises
-    ------
-    ValueError
-        If a shape is wrong; the message names the argument and its shape.
     """
 
 def geographic_to_geocentric(positions: _Floats, a: float, b: float) -> _Floats:
@@ -478,11 +432,6 @@ def geographic_to_geocentric(positions: _Floats, a: float, b: float) -> _Floats:
     Returns
     -------
     (n, 3) X, Y, Z in the linear unit of the axes.
-
-    Raises
-    ------
-    ValueError
-        If a shape is wrong (the message names the argument) or the axes are invalid.
     """
 
 def geocentric_to_geographic(xyz: _Floats, a: float, b: float) -> _Floats:
@@ -499,11 +448,6 @@ def geocentric_to_geographic(xyz: _Floats, a: float, b: float) -> _Floats:
     -------
     (n, 3) longitude (rad, in [-pi, pi], 0 on the axis), latitude (rad), height (linear unit of the axes),
     accurate to the rounding of the coordinates.
-
-    Raises
-    ------
-    ValueError
-        If a shape is wrong (the message names the argument) or the axes are invalid.
     """
 
 def project(
@@ -542,11 +486,6 @@ def project(
     Returns
     -------
     (n, 2) x, y in millimetres; not finite for a point in the plane of the projection centre (u3 = 0).
-
-    Raises
-    ------
-    ValueError
-        If a shape or length is wrong (the message names the argument), or axes or refraction are invalid.
     """
 
 def refraction_shift(
@@ -570,11 +509,6 @@ def refraction_shift(
     Returns
     -------
     (n, 3) vectors in the linear unit along X, Y, Z or the geocentric axes.
-
-    Raises
-    ------
-    ValueError
-        If a shape or length is wrong (the message names the argument), or axes or refraction are invalid.
     """
 
 class BlockError(Exception):
@@ -628,11 +562,6 @@ def find_first_values(
     points. (m,) whether an image was rejected. (n,) whether the images of a control point agree with each
     other but not with its coordinates. The photo that defines the datum, if nothing else does. The median
     angle between observed and computed directions, radians.
-
-    Raises
-    ------
-    ValueError
-        If a shape, length or index is wrong; the message names the argument.
     """
 
 def trajectory_span(trajectory: TrajectoryRow) -> tuple[float, float]:
@@ -782,11 +711,6 @@ def block_network(
         Maximum bytes of the adjustment and of later covariances; None: unlimited.
     points_given
         Whether points start from their coordinates, if known, instead of the intersection of their rays.
-
-    Raises
-    ------
-    ValueError
-        If a shape, length or choice is wrong; the message names the argument.
     """
 
 @final
@@ -1463,11 +1387,6 @@ class BlockState:
         comparable with translations. None for a datum of fixed unknowns.
     released
         Whether minimal control was released for the datum.
-
-    Raises
-    ------
-    ValueError
-        If the ordering or datum does not exist.
     """
 
     def __new__(
@@ -2042,11 +1961,6 @@ def transform_points(
     Returns
     -------
     (n, 3) X = A^T (x - B) / s and (n, 3, 3) covariances, ground units.
-
-    Raises
-    ------
-    ValueError
-        If a shape is wrong; the message names the argument and its shape.
     """
 
 def similarity_partials(similarity: CentredRow) -> _Floats:
@@ -2063,11 +1977,6 @@ def gauss_crout(normal: _Floats) -> tuple[_Floats, _Floats] | None:
     Returns
     -------
     (7, 8) auxiliary matrix D and (7,) solution E; None if a pivot vanishes.
-
-    Raises
-    ------
-    ValueError
-        If a shape is wrong; the message names the argument and its shape.
     """
 
 _Station = tuple[float, float, float, float]
@@ -2267,11 +2176,6 @@ class StellarProblem:
         star at the time of the image minus the adjusted place.
     axis
         Attitude, standard coordinates, plate coordinates and weight of the axis, if it is known.
-
-    Raises
-    ------
-    ValueError
-        If a shape is wrong.
     """
 
     def __new__(
@@ -2479,11 +2383,6 @@ def csv_rows(
         Lines before the rows.
     columns
         Columns of equal length.
-
-    Raises
-    ------
-    ValueError
-        If columns differ in length.
     """
 
 _ControlColumns = dict[str, Any]
@@ -2604,11 +2503,6 @@ def collection_images(camera: str, photo_parameters: _Floats, points: _Floats) -
     -------
     (n, 2) in the unit of the camera; not finite in the plane of the projection centre. The formula also
     applies to points behind the camera.
-
-    Raises
-    ------
-    ValueError
-        If a shape, length or choice is wrong; the message names the argument.
     """
 
 def collection_network(
@@ -2656,11 +2550,6 @@ def collection_network(
         `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
     memory
         Maximum bytes of the adjustment; None: unlimited.
-
-    Raises
-    ------
-    ValueError
-        If a shape, length or choice is wrong; the message names the argument.
     """
 
 @final
