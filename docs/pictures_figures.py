@@ -16,16 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram import (
-    Block,
-    InnerConstraints,
-    Result,
-    adjust,
-    adjust_started,
-    first_values,
-    formats,
-    simulate,
-)
+from photogram import Block, InnerConstraints, Result, adjust, adjust_started, first_values, formats, simulate
 from photogram.giant import read_project
 from photogram.plots import Plot
 from photogram.results.features import with_features

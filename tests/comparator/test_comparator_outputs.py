@@ -10,14 +10,7 @@ from plates import PRINTED, QUICK, STRAIGHT, bent, case_2, case_2_session, noisy
 
 from message_codes import described
 from photogram import AdjustmentError, InputError
-from photogram.comparator import (
-    Correction,
-    Grid,
-    Options,
-    calibrate,
-    listing,
-    simulate_calibration,
-)
+from photogram.comparator import Correction, Grid, Options, calibrate, listing, simulate_calibration
 from photogram.comparator.averages import listed_grid_sigma, text_grid_sigma
 from photogram.comparator.case import exchanged
 from photogram.comparator.correction import partials_of

@@ -7,14 +7,7 @@ import numpy as np
 import pytest
 
 from golden_data import DATA, golden
-from photogram.film import (
-    Certificate,
-    Crossing,
-    MarkDistance,
-    RadialTable,
-    RightAngle,
-    adjust_distances,
-)
+from photogram.film import Certificate, Crossing, MarkDistance, RadialTable, RightAngle, adjust_distances
 from photogram.film.lens_table import backward, chosen, curves_of, fit_curve, forward
 
 PAIRS = {"lr": ("ml", "mr"), "tb": ("mt", "mb"), "llur": ("ll", "ur"), "ullr": ("ul", "lr")}

@@ -8,14 +8,7 @@ import pytest
 from example_scripts import load
 from message_codes import coded
 from photogram import InputError, _photocore
-from photogram.stellar import (
-    LENSES,
-    SkyCamera,
-    apparent_places,
-    calibrate_night,
-    project_sky,
-    sidereal_time,
-)
+from photogram.stellar import LENSES, SkyCamera, apparent_places, calibrate_night, project_sky, sidereal_time
 from photogram.stellar.night_document import lenses as lens_table
 from photogram.stellar.sky_calibration import partials
 

@@ -9,13 +9,7 @@ from typer.testing import CliRunner
 
 from message_codes import refusal
 from photogram.cli import app
-from photogram.targets import (
-    Board,
-    nominal_camera,
-    plan_views,
-    simulate_corners,
-    uncertainty_map,
-)
+from photogram.targets import Board, nominal_camera, plan_views, simulate_corners, uncertainty_map
 
 SIZE = (800, 600)
 BOARD = Board(columns=6, rows=5, spacing=0.03, shape="held")

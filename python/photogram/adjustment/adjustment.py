@@ -34,13 +34,7 @@ from photogram.memory import threads_that_fit, turned
 from photogram.messages import Message
 from photogram.network.block import Block, checked
 from photogram.network.core_arrays import CoreOptions, block_network
-from photogram.network.datum import (
-    DatumRow,
-    InnerConstraints,
-    MinimumConstraints,
-    datum_row,
-    minimum_row,
-)
+from photogram.network.datum import DatumRow, InnerConstraints, MinimumConstraints, datum_row, minimum_row
 from photogram.network.unknowns import Unknown
 from photogram.results.datum import ResultDatum, datum_messages, datum_of, refused, tested_together
 from photogram.results.parts import Iteration

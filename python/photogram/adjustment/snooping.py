@@ -11,13 +11,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.adjustment import (
-    Progress,
-    adjust,
-    adjusted,
-    core_threads,
-    options_in_datum,
-)
+from photogram.adjustment.adjustment import Progress, adjust, adjusted, core_threads, options_in_datum
 from photogram.adjustment.exchanged_names import exchanged_names
 from photogram.adjustment.first_features import started, with_poses
 from photogram.adjustment.first_values import FirstValues, first_values

@@ -8,12 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram import _photocore
-from photogram.adjustment.adjustment import (
-    Progress,
-    core_options,
-    core_threads,
-    teller,
-)
+from photogram.adjustment.adjustment import Progress, core_options, core_threads, teller
 from photogram.adjustment.options import AdjustOptions, Ordering
 from photogram.adjustment.remarks import hardly_determined, harmful_points, hidden, rounded
 from photogram.adjustment.robust import Loss, remark

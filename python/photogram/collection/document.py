@@ -9,12 +9,7 @@ import numpy as np
 
 from photogram.collection.collection import POSE
 from photogram.plots.accessor import drawings
-from photogram.results.network_document import (
-    network_document,
-    network_members,
-    size_section,
-    used_fact,
-)
+from photogram.results.network_document import network_document, network_members, size_section, used_fact
 from photogram.results.network_sections import control_section, stations_section
 from photogram.results.network_tables import image_axes
 from photogram.results.parts import Terms

@@ -29,14 +29,7 @@ from photogram.network.block import Block
 from photogram.network.cameras import Camera
 from photogram.network.core_arrays import CoreOptions
 from photogram.network.motion import image_rows
-from photogram.results.network_trial import (
-    ATTITUDE,
-    CONTROL,
-    POSITION,
-    LostSupportError,
-    NetworkTrial,
-    Out,
-)
+from photogram.results.network_trial import ATTITUDE, CONTROL, POSITION, LostSupportError, NetworkTrial, Out
 from photogram.results.snooping_log import Aside, Outcome, snooped
 from photogram.results.snooping_options import SnoopOptions
 from photogram.results.snooping_result import Snooped

@@ -23,17 +23,7 @@ from photogram.comparator.tables import (
 )
 from photogram.io.angles import ARCSEC
 from photogram.show.judgement import remarks_section, verdict_document, verdict_table
-from photogram.show.page import (
-    Document,
-    Drawing,
-    Fact,
-    Facts,
-    Layers,
-    Part,
-    Section,
-    about,
-    conventions,
-)
+from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Section, about, conventions
 from photogram.show.quantity import members
 from photogram.statistics.findings import Findings, Systematic, Tested
 from photogram.words import Phrase, phrase

@@ -22,14 +22,7 @@ from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.conventions import quaternion_readings
 from photogram.diagnosis.mistakes import Change, Proposal
 from photogram.diagnosis.moving import shifts
-from photogram.diagnosis.predictions import (
-    MOST,
-    UNKNOWN,
-    eligible,
-    given_points,
-    predict,
-    relative,
-)
+from photogram.diagnosis.predictions import MOST, UNKNOWN, eligible, given_points, predict, relative
 from photogram.diagnosis.sets import arm_of
 from photogram.errors import InputError
 from photogram.messages import Message

@@ -15,12 +15,7 @@ import numpy as np
 import orjson
 
 from photogram import _photocore
-from photogram.adjustment.adjustment import (
-    Progress,
-    adjust,
-    core_threads,
-    options_in_datum,
-)
+from photogram.adjustment.adjustment import Progress, adjust, core_threads, options_in_datum
 from photogram.adjustment.first_features import started
 from photogram.adjustment.options import AdjustOptions
 from photogram.adjustment.remarks import check_cameras
@@ -43,9 +38,7 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.memory import resident_memory
 from photogram.network.block import Block, checked, refuse_passages
 from photogram.network.core_arrays import CoreOptions
-from photogram.network.datum import (
-    DatumRow,
-)
+from photogram.network.datum import DatumRow
 from photogram.network.films import Scan
 from photogram.results.result import Result
 from photogram.words import phrase

@@ -41,13 +41,7 @@ from photogram.network.films import reads_pixels
 from photogram.network.frame import Frame
 from photogram.network.geometry import Spheroid
 from photogram.network.moving_photos import Mount, Timed
-from photogram.network.observations import (
-    Observation,
-    Observations,
-    all_trajectories,
-    moments,
-    of_records,
-)
+from photogram.network.observations import Observation, Observations, all_trajectories, moments, of_records
 from photogram.network.observations.columns import Group
 from photogram.network.passages import Knots, Passage
 from photogram.network.refraction import Refraction

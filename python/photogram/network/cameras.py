@@ -11,15 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import (
-    LARGEST_SD,
-    argument_error,
-    is_covariance,
-    number,
-    one_of,
-    shaped,
-    text,
-)
+from photogram.arguments.arrays import LARGEST_SD, argument_error, is_covariance, number, one_of, shaped, text
 from photogram.arguments.equality import Valued
 from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import kind_error, require

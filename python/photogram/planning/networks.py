@@ -20,16 +20,7 @@ from photogram.planning.pattern import Pattern, UnknownQuality, with_known_reado
 from photogram.results.hypotheses import FEWEST
 from photogram.show.judgement import remarks_section
 from photogram.show.methods import Documented
-from photogram.show.page import (
-    Document,
-    Drawing,
-    Fact,
-    Judgement,
-    Layers,
-    Section,
-    about,
-    significant,
-)
+from photogram.show.page import Document, Drawing, Fact, Judgement, Layers, Section, about, significant
 from photogram.show.quantity import Axis, Quantity, Table, component, members, of_each
 from photogram.show.sketch.marks import NOWHERE, Mark, Markers, Panel, Shades, around
 from photogram.show.sketch.plot import Plot

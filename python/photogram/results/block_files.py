@@ -13,16 +13,7 @@ from photogram.io.column_table import NameColumn
 from photogram.io.parquet import Column
 from photogram.io.writing import Content
 from photogram.messages import Message, Undetermined
-from photogram.network import (
-    cameras,
-    core_arrays,
-    films,
-    frame,
-    geometry,
-    lens,
-    moving_photos,
-    refraction,
-)
+from photogram.network import cameras, core_arrays, films, frame, geometry, lens, moving_photos, refraction
 from photogram.network import trajectories as motion
 from photogram.network.block import Block
 from photogram.network.motion import scanners

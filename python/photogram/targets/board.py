@@ -13,14 +13,7 @@ from typing import Any, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from photogram.arguments.arrays import (
-    argument_error,
-    frozen,
-    names,
-    number,
-    shaped,
-    text,
-)
+from photogram.arguments.arrays import argument_error, frozen, names, number, shaped, text
 from photogram.arguments.equality import Valued
 from photogram.arguments.fields import check_fields, option
 from photogram.arguments.types import Floats

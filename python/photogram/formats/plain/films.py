@@ -43,16 +43,7 @@ from photogram.formats.project import Project
 from photogram.io.column_table import FALSE, TRUE, ColumnTable
 from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
-from photogram.network.films import (
-    Film,
-    FilmBend,
-    FilmPlacement,
-    FilmSize,
-    Readings,
-    Reseau,
-    Scan,
-    Scanner,
-)
+from photogram.network.films import Film, FilmBend, FilmPlacement, FilmSize, Readings, Reseau, Scan, Scanner
 from photogram.network.observations import FILM, Fiducial, KnownFilm, KnownTogether, Observation
 from photogram.words import phrase
 

@@ -28,13 +28,7 @@ from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block
 from photogram.network.observations import Observation, Smoothness, all_trajectories
 from photogram.network.observations.unknowns import smoothness_of
-from photogram.network.trajectories import (
-    Basis,
-    Polynomial,
-    Spline,
-    Table,
-    Trajectory,
-)
+from photogram.network.trajectories import Basis, Polynomial, Spline, Table, Trajectory
 from photogram.words import phrase
 
 _OTHERS = (

@@ -5,12 +5,7 @@ observed values, and their standard deviations `sd` or covariance matrix `covari
 minus computed.
 """
 
-from photogram.network.observations.columns import (
-    Observations,
-    all_trajectories,
-    moments,
-    of_records,
-)
+from photogram.network.observations.columns import Observations, all_trajectories, moments, of_records
 from photogram.network.observations.observation import Observation
 from photogram.network.observations.photos import Attitude, Position, Range, Rate, Relative, Velocity
 from photogram.network.observations.points import (

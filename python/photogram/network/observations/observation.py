@@ -8,14 +8,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from photogram.arguments.arrays import (
-    argument_error,
-    is_covariance,
-    length,
-    names,
-    numbers,
-    shaped,
-)
+from photogram.arguments.arrays import argument_error, is_covariance, length, names, numbers, shaped
 from photogram.arguments.objects import kind_error, require, require_kind
 from photogram.arguments.types import Bools, Floats
 from photogram.lazy_dataclasses import dataclass, field, fields, replace
