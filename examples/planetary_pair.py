@@ -20,13 +20,7 @@ import numpy as np
 from photogram import Attitudes, Result, Spheroid, adjust, formats
 from photogram.formats import ReadOptions
 from photogram.formats.csm import SupportedImage, read_support
-from photogram.formats.isis import (
-    POINT_TYPES,
-    ControlMeasures,
-    ControlNetwork,
-    ControlPoints,
-    network_text,
-)
+from photogram.formats.isis import POINT_TYPES, ControlMeasures, ControlNetwork, ControlPoints, network_text
 from photogram.network import geocentric_to_geographic, geographic_to_geocentric
 
 RADIUS, HEIGHT, SPEED = 1737.4, 50.0, 1.66
