@@ -59,7 +59,6 @@ def by_name(things: Iterable[Any], name: str, kind: str) -> Any:
 
 
 def missing_columns(missing: Sequence[str], columns: Sequence[str]) -> Phrase:
-    """Return the message for missing columns of a table."""
     fields = {"n": len(missing), "names": list(missing), "columns": list(columns)}
     return Phrase("error.missing-columns", fields)
 

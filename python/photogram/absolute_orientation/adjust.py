@@ -310,7 +310,6 @@ def _named(
     message: str,
     concerned: list[int],
 ) -> AdjustmentError | InputError:
-    """Return an error of the core with the names of its stations."""
     names = [stations.ids[rows[i]] for i in concerned if i < len(rows)]
     if kind == "insufficient":
         counts = dict(zip("xyz", map(int, used.sum(axis=0)), strict=True))

@@ -289,6 +289,5 @@ def _principal(places: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def _mean_rotation(turns: Sequence[Floats]) -> Floats:
-    """Return the rotation that is nearest to the mean of some rotations."""
     u, _, v = np.linalg.svd(np.mean(turns, axis=0))
     return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ v)]) @ v)

@@ -281,7 +281,6 @@ def one_of(name: str, value: object, choices: Sequence[str]) -> str:
 
 
 def object_name(name: str, value: object) -> str:
-    """Return the name of an object."""
     return names(name, [value])[0]
 
 

@@ -213,7 +213,6 @@ def _sequence(kind: Any, name: str, value: Any) -> Any:
 
 
 def _limited(check: Check, limits: Mapping[str, Any], of: str, *, optional: bool) -> Check:
-    """Return a check with the limits of a field."""
     from photogram.arguments.objects import require
 
     low, high = limits.get("low", -math.inf), limits.get("high", math.inf)

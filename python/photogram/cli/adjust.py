@@ -215,7 +215,6 @@ def adjusted_block(
     threads: int | None = None,
     division: Division | None = None,
 ) -> Result:
-    """Adjust a block by settings of its project and options of the user."""
     from photogram import FirstValues, adjust, adjust_started
     from photogram.diagnosis.after_adjustment import errors_explained
     from photogram.formats import adjusting
@@ -247,7 +246,6 @@ def result_at(
     keep_all: bool = False,
     fitted: bool = True,
 ) -> tuple[Result, Project | None]:
-    """Return a saved result, or the adjusted project of a path."""
     from photogram import Result, read_result
     from photogram.formats.recognition import results as is_result
 

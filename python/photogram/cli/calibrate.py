@@ -129,7 +129,6 @@ def _plan(
     worth: WorthOptions,
     need: float | None,
 ) -> None:
-    """Plan views, write and print the plan."""
     job.only(WITH_PLAN.split(), "conflict", options="--plan")
     documents.declare(job)
     from photogram.io.csv_text import csv_text
@@ -169,7 +168,6 @@ def _plan(
 
 
 def _board(seen: CalibrationOptions) -> Board:
-    """Return the board of `--board`."""
     from photogram.targets.reading import board_of
 
     board = board_of(seen, [seen.board] if isinstance(seen.board, Path) else [])

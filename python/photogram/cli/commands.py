@@ -151,7 +151,6 @@ class Command(_Params, TyperCommand):
                 parameter.metavar = ""
 
     def get_help_option(self, ctx: Any) -> Any:
-        """Return --help in its panel."""
         option: Any = super().get_help_option(ctx)
         if option is not None:
             option.rich_help_panel, option.metavar = "Run", ""

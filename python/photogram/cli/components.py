@@ -34,7 +34,6 @@ class AdjustmentOutcome(Generic[Network]):
 
     @property
     def subject(self) -> Snooped | Network:
-        """The subject of reports."""
         return self.log or self.result
 
     @property

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LensFit:
-    """Options for the fit of a lens."""
-
     radius: Annotated[float, typer.Option(min=1.0, show_default=False)] = math.inf
     distances: Sequence[float] = option((), kind=str, parse=distances_of, name="--distance")
     intrinsics_only: bool = False

@@ -44,7 +44,6 @@ def film(
 
 
 def _adjusted(job: Job, path: Path, reading: ReadOptions, interior: str, threads: int | None) -> Result:
-    """Adjust the block with the requested interior orientation of films."""
     from photogram import InputError
 
     settings = [*reading.settings, f"film.interior={interior}"]

@@ -73,8 +73,6 @@ class Changes(Only):
 
 
 class OptionClass(NamedTuple):
-    """A parameter of a command that is a class of options."""
-
     kind: type
     options: list[Parameter]
     changes: bool
@@ -134,7 +132,6 @@ def misuse(option: str, code: str, /, **values: Any) -> typer.BadParameter:
 
 
 def words_of(text: str) -> tuple[str, ...]:
-    """Return the words of an option with commas between them."""
     return tuple(word.strip() for word in text.split(",") if word.strip()) or (text,)
 
 
@@ -201,7 +198,6 @@ def field_option(field: Field[Any], kind: type, command: str, *, is_change: bool
 
 
 def options_of(command: Callable[..., Any]) -> tuple[list[Parameter], dict[str, OptionClass]]:
-    """Return options and arguments of a command, and its parameters that are classes of options."""
     options: list[Parameter] = []
     classes: dict[str, OptionClass] = {}
     for parameter in signature(command, eval_str=True).parameters.values():
@@ -240,7 +236,6 @@ def _holds_path(kind: object) -> bool:
 
 
 def option_name(parameter: Parameter) -> str:
-    """Return the name of an option on the command line."""
     info = mark(parameter, OptionInfo)
     # In an annotation, the default of the mark is the first option name.
     given = () if info is None else (info.default, *(info.param_decls or ()))

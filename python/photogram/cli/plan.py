@@ -164,7 +164,6 @@ def _giant_files(
 
 
 def _tables(block: Block, out: Path, *, overwrite: bool) -> dict[Path, bytes]:
-    """Return the tables of a block that moves."""
     from photogram.errors import InputError
     from photogram.formats.plain.writing import write
     from photogram.formats.project import Project

@@ -59,7 +59,6 @@ def statement(
 
 
 def _project_beside(job: Job, folder: Path, result: Result) -> Project | None:
-    """Return the plain project in the folder of a saved result, if it fits."""
     from photogram.formats import read
 
     settings = folder.resolve().with_name("project.toml")

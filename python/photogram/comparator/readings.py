@@ -292,7 +292,6 @@ def rows_by_point(points: Indices) -> list[tuple[int, Indices]]:
 
 
 def group_as_listed(points: Indices) -> Indices:
-    """Return the order of readings in the listing."""
     order = list(range(len(points)))
     numbers = points.tolist()
     # Positions of the readings of each point; those before `start` were moved.

@@ -24,7 +24,6 @@ MAX_FINDINGS = 200  # rows of the table of findings
 
 
 def check_document(title: str, verdict: Verdict, parts: Sequence[Section], result: Result | None) -> Document:
-    """Return the document of a check and its adjustment."""
     findings = [(finding, part.title) for part in parts for finding in part.findings]
     grave = sum(finding.level == "grave" for finding, _ in findings)
     look = len(findings) - grave

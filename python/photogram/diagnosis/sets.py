@@ -84,7 +84,6 @@ def wrong_control(block: Block, adjusted: Adjuster) -> Explained | None:
 
 
 def intended(block: Block, kind: str) -> Block:
-    """Return the block with the intended control."""
     order, factors = SETS[kind]
     control = np.asarray(np.isfinite(block.point_sd).any(axis=1))
     return with_coordinates(block, "points", order, factors, control)

@@ -33,7 +33,6 @@ def mad_sd(values: Floats) -> float:
 
 
 def grouped(values: NDArray[Any], groups: Indices, count: int) -> list[NDArray[Any]]:
-    """Return the values of each of `count` groups."""
     return [values[rows] for rows in rows_of_each(groups, count)]
 
 

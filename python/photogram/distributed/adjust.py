@@ -185,7 +185,6 @@ def _counted(block: Block, parts: int) -> Counts:
 
 
 def fingerprint(block: Block, options: CoreOptions, row: DatumRow | None = None) -> str:
-    """Return a hash of a block and its adjustment options."""
     digest = hashlib.sha256(repr((options, row)).encode())
     for name in IN_TABLES:
         values = getattr(block, name)

@@ -97,7 +97,6 @@ class Element:
             raise found.error(message_of(error)) from None
 
     def attribute(self, name: str, default: float | None = None) -> float:
-        """Return an attribute as a number."""
         if name not in self.attributes:
             if default is not None:
                 return default

@@ -209,7 +209,6 @@ class Columns:
         self.plain = np.ones(len(records), dtype=bool)
 
     def blank(self, first: int, last: int) -> Bools:
-        """Return which fields are blank."""
         blank: Bools = (self._field(first, last) == BLANK).all(axis=1)
         return blank
 

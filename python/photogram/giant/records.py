@@ -21,8 +21,6 @@ QUARTER_CIRCLE = math.pi / 2 + 1e-12  # The largest latitude, with a tolerance f
 
 @dataclass(frozen=True, eq=False)
 class Source(records.Source):
-    """The records of one file."""
-
     strip: str = ""  # The leading character removed from names (COMMON column 15), or empty
 
     @classmethod

@@ -86,7 +86,6 @@ class ColumnTable:
 
     @property
     def comments(self) -> list[Place]:
-        """The comments of a text file."""
         lines = enumerate(self._lines, 1)
         return [Place(self.path, row, line) for row, line in lines if line.lstrip().startswith(COMMENT)]
 
@@ -109,7 +108,6 @@ class ColumnTable:
         return TableRow(self, row)
 
     def cell_error(self, row: int, column: str, code: str, **fields: Any) -> InputError:
-        """Return an error of a cell from the code of its message."""
         return self.error(row, phrase("error.column", column=column, message=Phrase(code, fields)))
 
     def unknown_error(
@@ -120,7 +118,6 @@ class ColumnTable:
         return self.error(row, phrase("error.column", column=column, message=message))
 
     def renamed(self, names: Mapping[str, str]) -> ColumnTable:
-        """Return the table with new names of some columns."""
         columns = tuple(names.get(column, column) for column in self.columns)
         cells = {names.get(column, column): own for column, own in self.cells.items()}
         return replace(self, columns=columns, cells=cells)
@@ -149,7 +146,6 @@ class ColumnTable:
         return replace(self, count=self.count + other.count, cells=cells, records=records)
 
     def with_texts(self, column: str, texts: Sequence[str]) -> ColumnTable:
-        """Return the table with new texts in a column."""
         return replace(self, cells={**self.cells, column: texts})
 
     def require(self, *columns: str) -> None:

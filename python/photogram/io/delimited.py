@@ -342,7 +342,6 @@ def _regular(
 
 
 def _of_reader(path: Path, header: _Header, reader: _photocore.TableReader, first: int) -> ColumnTable:
-    """Return the table of a reader, from its first record."""
     head, own, columns, delimiter = header
     cells: dict[str, Cells] = {}
     for column, content in zip(columns, reader.columns(), strict=True):
@@ -384,7 +383,6 @@ def _parquet(
 def _of_arrow(
     path: Path, table: pyarrow.Table, spelling: Spelling, numbers: Collection[str], first: int
 ) -> ColumnTable:
-    """Return a table from the table of Arrow, from its first record."""
     from pyarrow import types
 
     from photogram.io.parquet import coded

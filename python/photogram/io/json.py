@@ -60,7 +60,6 @@ def holding(what: str, path: Path | None = None) -> Iterator[None]:
 
 
 def read_json(path: Path) -> Tree:
-    """Read a JSON document."""
     data = read_bytes(path).removeprefix(b"\xef\xbb\xbf")
     try:
         return Tree(orjson.loads(data), path)

@@ -27,8 +27,6 @@ LEVEL = 1  # Compression level of zstd: higher levels hardly reduce measured num
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """A column."""
-
     name: str  # Without blanks
     values: Any  # (rows,) an array or names, or (rows, k) an array: k numbers in each row
     unit: str = ""  # `m`, `rad`, `px`, `m2` ...; `1` for plain numbers; empty without unit

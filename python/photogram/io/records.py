@@ -24,8 +24,6 @@ _INTEGER = re.compile(r"[+-]?\d+", re.ASCII)
 
 @dataclass(frozen=True, eq=False)
 class Source:
-    """The records of one file."""
-
     path: Path  # Path of the file
     lines: list[str]  # Its records without line ends, cut after column 80
     messages: list[Message] = field(default_factory=list)  # Remarks of the reader
@@ -93,7 +91,6 @@ class Record:
         return self.text[first - 1 : last]
 
     def blank(self, first: int, last: int) -> bool:
-        """Whether a field is blank."""
         return not self.columns(first, last).strip(" ")
 
 

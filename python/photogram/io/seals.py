@@ -20,8 +20,6 @@ LISTED = 200  # Maximum number of listed input files
 
 @dataclass(frozen=True)
 class InputFile:
-    """A file that was read."""
-
     path: Path
     size: int
     sha256: str
@@ -35,7 +33,6 @@ def input_files(paths: Iterable[Path]) -> tuple[list[InputFile], int]:
 
 
 def checksum(path: Path) -> str:
-    """Return the checksum of a file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -230,7 +230,6 @@ class TomlTree(Tree):
 
 
 def read_toml(path: Path) -> TomlTree:
-    """Read a TOML file."""
     source = TomlFile(path)
     return TomlTree(source.content, path, source=source)
 

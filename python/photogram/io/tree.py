@@ -34,7 +34,6 @@ class Tree:
         return InputError(located, file=self.file, text=repr(self.value)[:120])
 
     def value_error(self, code: str, **fields: Any) -> InputError:
-        """Return an error of the value from the code of its message."""
         return self.error(phrase(code, value=value_field(self.value), **fields))
 
     def _missing(self, key: str) -> InputError:
@@ -118,7 +117,6 @@ class Tree:
         return str(self._as(str, "toml.text"))
 
     def choice(self, words: Collection[str]) -> str:
-        """Return one of some words."""
         if not isinstance(self.value, str) or self.value not in words:
             raise self.value_error("error.choice", names=list(words))
         return self.value

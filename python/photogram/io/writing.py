@@ -134,7 +134,6 @@ class _Target:
 
 
 def follow(path: Path) -> _Target:
-    """Return the target of an output path."""
     if "\0" in str(path):
         raise InputError(phrase("file.nul"), file=path)
     with naming(path):

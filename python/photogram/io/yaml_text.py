@@ -110,7 +110,6 @@ def camera_info(
 
 
 def matrix_lines(name: str, values: ArrayLike, *, opencv: bool = False) -> list[str]:
-    """Return a matrix in the format of ROS or OpenCV."""
     found = np.atleast_2d(np.asarray(values, dtype=float))
     rows, columns = found.shape
     tag, indent, kind = (" !!opencv-matrix", "   ", ["dt: d"]) if opencv else ("", "  ", [])

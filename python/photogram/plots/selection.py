@@ -26,7 +26,6 @@ def thinned(what: str, rows: Indices, most: int) -> tuple[Indices, str]:
 def first_panels(
     plot: str, what: str, parts: Sequence[T], most: int, draw: Callable[[T], Panel]
 ) -> list[Panel]:
-    """Return panels of the first parts, with a note if there are more."""
     if not parts:
         raise InputError(phrase(f"plot.{plot}"))
     panels = [draw(part) for part in parts[:most]]

@@ -92,7 +92,6 @@ class VarianceComponents(Judged, Tabular):
         return Plot(6.4, 1.6 + INCHES_OF_COMPONENT * len(self.components), [panel])
 
     def __getitem__(self, name: str) -> Component:
-        """Return the component of a group."""
         for each in self.components:
             if name == each.name or name in each.members:
                 return each
@@ -133,7 +132,6 @@ class VarianceComponents(Judged, Tabular):
 
 
 def weighed_document(found: VarianceComponents, network: Document) -> Document:
-    """Return the document of the network with findings on the components."""
     own = found.document()
     sections = [*own.sections, *network.sections]
     return replace(network, judgements=own.judgements, advice=own.advice, sections=sections)

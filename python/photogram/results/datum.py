@@ -197,8 +197,6 @@ MOST = 1000  # Largest number of check points in the joint test; of more points 
 
 @dataclass(frozen=True, eq=False)
 class CheckPoints:
-    """The k check points of a result."""
-
     rows: Indices  # (k,) among all points
     names: tuple[str, ...]  # Names of the points
     differences: Floats  # (k, 3) adjusted minus given, in the units of the block; NaN if not given

@@ -87,7 +87,6 @@ class Feature:
     probability: float | None = None
 
     def __getitem__(self, name: str) -> Quantity:
-        """Return a quantity by its name."""
         found: Quantity = by_name(self.quantities, name, "quantity")
         return found
 
@@ -125,7 +124,6 @@ class Features:
     remarks: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Feature:
-        """Return a feature by its name."""
         found: Feature = by_name(self.features, name, "feature")
         return found
 
@@ -134,7 +132,6 @@ class Features:
         return iter(self.features)
 
     def __len__(self) -> int:
-        """Return the number of features."""
         return len(self.features)
 
     @property

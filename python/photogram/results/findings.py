@@ -57,7 +57,6 @@ def network_findings(
     fixed: Sequence[Tested],
     systematic: Sequence[Systematic],
 ) -> Findings:
-    """Return the findings of all networks, with tests of fixed values and of patterns."""
     tests, summary = Tests(result), result.reliability_summary
     test, remarks, of_summary = _whole_test(result), unseen(result), dict[str, Any]()
     lost = None if summary is None else summary.downweighted

@@ -27,8 +27,6 @@ HORIZON = math.radians(80.0)  # Limit of footprints from the vertical
 
 @dataclass(frozen=True, eq=False)
 class Footprints:
-    """Footprints of P photos."""
-
     # (P, 17, 3) closed outlines in metric axes, counter-clockwise like the image corners from the lower left;
     # NaN for photos at or below the ground, beyond the field of the lens, and for scanners, which have
     # several poses

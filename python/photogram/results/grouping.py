@@ -169,7 +169,6 @@ def _by(of: Observables, bases: Sequence[str]) -> _Labelled:
 
 
 def _images_by(of: Observables, basis: str) -> tuple[list[str], Indices]:
-    """Return names of groups of images, and the number of the group of each image."""
     photos, seen = of.given.image_photos, of.given.image_points
     if basis == "photo":
         return [f"photo {name}" for name in of.given.photo_ids], photos
@@ -321,7 +320,6 @@ class GroupSums(Tabular):
         ]
 
     def __getitem__(self, name: str) -> GroupSum:
-        """Return a group by its name."""
         found: GroupSum = by_name(self.groups, name, "group")
         return found
 

@@ -49,8 +49,6 @@ SEEN = 2000  # Number of images for the effect of terms
 
 @dataclass(frozen=True)
 class TermsTest:
-    """A joint test of terms of a camera."""
-
     camera: str  # camera and its parameters
     names: tuple[str, ...]
     statistic: float  # T: increase of the weighted sum of squares without them, or decrease with them

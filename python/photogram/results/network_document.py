@@ -113,7 +113,6 @@ def problems_of(result: AdjustedNetwork) -> list[str]:
 
 
 def network_members(result: AdjustedNetwork, photo_members: Quantities = ()) -> dict[str, Any]:
-    """Return JSON members of all networks, with additional members of photos."""
     summary = result.reliability_summary
     of_photos = Quantity(result.photo_covariances, member="covariance")
     return {

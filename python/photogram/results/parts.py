@@ -271,7 +271,6 @@ class AdjustedUnknown:
 def adjusted_unknowns(
     block: Block, solution: _photocore.BlockSolution, scale: float
 ) -> tuple[AdjustedUnknown, ...]:
-    """Return the adjusted unknowns of a block with scaled covariances."""
     found = []
     # Factors of line rates have the type of readout times, but are plain numbers.
     factors = {id(each.rate) for each in block.timed if each.rate is not None}

@@ -144,7 +144,6 @@ class Saved:
     def arrays(
         self, parts: Mapping[str, Sequence[Part]], given: str
     ) -> tuple[dict[str, Any], dict[str, Any]]:
-        """Return the arrays of a result and of the given network, by the names of fields."""
         own: dict[str, Any] = {}
         others: dict[str, Any] = {}
         variance = self.summary["variance_of_unit_weight"]
@@ -259,7 +258,6 @@ def written(
 
 
 def _digest(result: AdjustedNetwork, given: str, parts: Mapping[str, Sequence[Part]], rest: Any) -> str:
-    """Return a checksum that identifies the given network."""
     digest = hashlib.sha256(orjson.dumps(rest))
     adjusted = getattr(result, given)
     own = [each.field for one in parts.values() for each in one if each.field.startswith(f"{given}.")]

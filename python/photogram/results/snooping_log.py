@@ -250,13 +250,10 @@ def snooped(
 
 
 class _Names:
-    """Names for the numbers of the log of the core."""
-
     def __init__(self, suspects: NamedSuspects, aside: Aside | None) -> None:
         self.suspects, self.aside = suspects, aside
 
     def removal(self, entry: dict[str, Any]) -> Removal:
-        """Return an entry of the log of the core with names and units."""
         suspects, group, rows, photo = self.suspects, entry["group"], entry["rows"], entry.pop("photo")
         components = tuple(map(suspects.row_name, rows))
         if photo is not None:

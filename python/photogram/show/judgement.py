@@ -57,7 +57,6 @@ def verdict_table(verdict: Verdict, words: Words | None = None) -> Table:
 
 
 def remarks_section(sentences: Iterable[object]) -> Section:
-    """Return the section of warnings."""
     return Section("remarks", "Remarks", [Remarks([str(each) for each in sentences])])
 
 

@@ -31,8 +31,6 @@ LEAST_PROBABILITY = 1e-99  # Smaller probabilities are reported as below
 
 @dataclass(frozen=True)
 class Column:
-    """A formatted column."""
-
     head: str
     cells: Sequence[str]
     unit: str = ""
@@ -206,7 +204,6 @@ class Document:
 
 
 def without_layers(parts: Sequence[Part]) -> list[Part]:
-    """Return parts with the parts of layers instead of these."""
     return [one for part in parts for one in (part.parts if isinstance(part, Layers) else [part])]
 
 

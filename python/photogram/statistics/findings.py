@@ -305,7 +305,6 @@ class Removed:
         return len(self.removed) if self.number is None else self.number
 
     def share(self, kind: Text) -> float:
-        """Return the removed share of the observations of a type."""
         removed, all_ = self.counts.get(kind, (0, 1))
         return removed / all_
 

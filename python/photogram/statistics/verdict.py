@@ -164,7 +164,6 @@ def worst(verdicts: Iterable[Verdict], *, strict: bool = False) -> int:
 
 
 def _next_steps(rule: Rule, e: Evidence, *, usable: bool) -> tuple[Phrase, ...]:
-    """Return the next steps of a rule, and of the program."""
     found = e.found
     # Fixed values are not observations, and a second snooping finds nothing more.
     snooping = (found.snooped is None or found.robust) and not (e.gross and e.gross[0][1].held)

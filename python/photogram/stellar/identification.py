@@ -332,7 +332,6 @@ def turned_to(rays: Floats, directions: Floats) -> Floats:
 
 
 def has_named_stars(exposure: Exposure) -> bool:
-    """Return whether an exposure names enough stars for its attitude."""
     return exposure.stars is not None and int((exposure.stars >= 0).sum()) >= STARS_OF_AN_ATTITUDE
 
 

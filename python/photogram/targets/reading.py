@@ -125,7 +125,6 @@ def _not_used(corners: Corners) -> list[Message]:
 
 
 def board_of(options: CalibrationOptions, described: Sequence[Path]) -> Board | None:
-    """Return the board of the options, or of the only file that describes one."""
     if isinstance(options.board, Board):
         return options.board
     if isinstance(options.board, tuple):

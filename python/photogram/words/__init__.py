@@ -113,7 +113,6 @@ def table_of(language: str) -> Mapping[str, str]:
 
 @cache
 def words_of(language: str) -> Words:
-    """Return the words of a language."""
     return Words(language)
 
 

@@ -62,7 +62,6 @@ class _Numbers:
         return values
 
     def fault(self, index: int, message: Phrase) -> InputError:
-        """Return an error at the line of a number."""
         return at(self.path, self.words + index, message)
 
 

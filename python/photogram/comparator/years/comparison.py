@@ -45,7 +45,6 @@ LEAST_UM = 2e-3
 
 
 def common_range(records: Sequence[RecordedCalibration]) -> Frame:
-    """Return the range of readings of all calibrations."""
     identities = [each.correction.identity for each in records]
     low = np.max([each.low_um for each in identities if each], axis=0)
     high = np.min([each.high_um for each in identities if each], axis=0)

@@ -162,7 +162,6 @@ def updated_support(image: Image, adjusted: AdjustedTrajectory) -> bytes | None:
 
 
 def _adjusted_image(image: Image, adjusted: AdjustedTrajectory) -> SupportedImage:
-    """Return an image on its adjusted trajectory, with its other tables."""
     own, over = adjusted.given, image.solving.over
     table = trajectory_of(image.supported.isd, own.name, interpolation="isis").table
     taken: tuple[str, ...] = ()

@@ -236,7 +236,6 @@ def _pattern(table: ColumnTable, row: int, cells: Mapping[str, Any]) -> Callable
 
 
 def roll_of(film: Film, known: KnownFilm | None) -> Roll | None:
-    """Return the roll of a film, or of its prior."""
     return known.roll if film.roll is None and known is not None else film.roll
 
 
@@ -431,7 +430,6 @@ class Marks:
 def read_fiducials(
     tables: Tables, cameras: Collection[str], certificates: Mapping[str, Certificate]
 ) -> dict[str, Marks]:
-    """Read the marks of cameras from the table and from certificates."""
     found, table = dict[str, Marks](), tables.rows("fiducials")
     xy = table.given(("x", "y"))
     sd = tables.deviations(table, "fiducials", ("sd_x", "sd_y"), SD_MARK)

@@ -115,7 +115,6 @@ class Key(NamedTuple):
 
 
 def _existing(table: TomlTree, key: str, name: str, kind: str = "file") -> Path:
-    """Return the path of an existing file or folder."""
     path = table.file.parent / name
     # The functions of os.path also accept names that are too long for the system.
     if not (os.path.isdir if kind == "folder" else os.path.isfile)(path):

@@ -200,7 +200,6 @@ def read_smoothness(tables: Tables, trajectories: Mapping[str, Trajectory]) -> l
 
 
 def shared_trajectories(block: Block) -> list[Trajectory]:
-    """Return trajectories of a block, except trajectories of single photos."""
     own = [each.trajectory for each in block.timed if each.trajectory is not None]
     found = all_trajectories(own, block.observations)
     names = [each.name for each in found]

@@ -49,7 +49,6 @@ def _mapping(name: str, value: object) -> Mapping[Any, Any]:
 
 
 def _by_name(check: Callable[[str, Any], Any]) -> Callable[[str, Any], dict[str, Any]]:
-    """Return the check of a mapping from the check of its values."""
     return lambda name, value: {
         _text(name, key): check(f"{name} {key}", own) for key, own in _mapping(name, value).items()
     }

@@ -176,7 +176,6 @@ def quality_measures(statement: Statement) -> Table:
 
 
 def files_of_statement(statement: Statement) -> dict[str, bytes]:
-    """Return the tables of a statement as CSV text, by the names of files."""
     unit = statement.result.block.linear_unit
     columns = frame(check_points(statement).columns)
     for name, code in statement.compared.not_usable:
