@@ -26,7 +26,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from photogram import AdjustmentError, InputError
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.stellar import Air, Site
 from photogram.stellar.catalogue import Catalogue
 from photogram.stellar.identification import STRETCH

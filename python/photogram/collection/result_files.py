@@ -8,7 +8,7 @@ import numpy as np
 
 from photogram.io.parquet import Column
 from photogram.io.writing import Content
-from photogram.network.frame import Frame
+from photogram.network.geometry import Frame
 from photogram.results.network_tables import TABLES
 from photogram.results.result_files import (
     GIVEN_SD,

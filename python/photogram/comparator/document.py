@@ -21,7 +21,7 @@ from photogram.comparator.tables import (
     terms,
     variance,
 )
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.show.judgement import remarks_section, verdict_document, verdict_table
 from photogram.show.page import Document, Drawing, Fact, Facts, Layers, Part, Section, about, conventions
 from photogram.show.quantity import members

@@ -19,7 +19,7 @@ from photogram.comparator.grid import Grid
 from photogram.comparator.readings import Precision
 from photogram.comparator.tables import linear, variance
 from photogram.comparator.variance import CombinedPolynomial, SinglePolynomial
-from photogram.io.angles import ARCSEC, degrees_minutes_seconds
+from photogram.io.numbers import ARCSEC, degrees_minutes_seconds
 
 if TYPE_CHECKING:
     from photogram.comparator import Calibration, CaseResult, PlateResult

@@ -31,7 +31,7 @@ from photogram.diagnosis.tested_values import (
     spread_of,
 )
 from photogram.errors import AdjustmentError
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.network.block import Block, flown_by
 from photogram.network.motion import kept_images, of_photos

@@ -82,7 +82,12 @@ def flown_hypotheses(block: Block, photos: Indices) -> Iterator[Proposal]:
     if block.principal_distances is not None or any("c" in each.names for each in block.cameras):
         yield Proposal("sign of c", phrase("mistake.sign of c"), _looking_back)
     if any(each.lines is not None for each in block.timed):
-        yield from _of_scanners(block, photos)
+        # Lines, samples or both are counted from the other end. With l the observed, p the predicted lines,
+        # l = s - p; s is the median of l + p.
+        predicted = flown_predictions(block, photos)
+        for name, axes in (("reversed", (1,)), ("turned", (0, 1)), ("mirrored samples", (0,))):
+            change: Change = partial(_counted_back, predicted=predicted, axes=axes)
+            yield Proposal(name, phrase(f"mistake.scanner.{name}"), change, exact=False)
 
 
 def _of_times(of: str, change: Callable[..., Block]) -> Iterator[Proposal]:
@@ -165,17 +170,6 @@ def _shifted_records(block: Block, seconds: float) -> Block:
             for each in block.observations
         ]
     )
-
-
-def _of_scanners(block: Block, photos: Indices) -> Iterator[Proposal]:
-    """Yield the hypotheses that lines, samples or both are counted from the other end.
-
-    With l the observed and p the predicted lines, l = s - p if they are; s is the median of l + p.
-    """
-    predicted = flown_predictions(block, photos)
-    for name, axes in (("reversed", (1,)), ("turned", (0, 1)), ("mirrored samples", (0,))):
-        change: Change = partial(_counted_back, predicted=predicted, axes=axes)
-        yield Proposal(name, phrase(f"mistake.scanner.{name}"), change, exact=False)
 
 
 def _counted_back(block: Block, predicted: Floats, axes: tuple[int, ...]) -> Block:

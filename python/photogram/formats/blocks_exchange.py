@@ -25,7 +25,7 @@ from photogram.io.places import at_place, image_size, one_word, positive
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.cameras import Camera
-from photogram.network.frame import Frame
+from photogram.network.geometry import Frame
 from photogram.network.observations import Position
 from photogram.words import Phrase, option_sd, phrase
 

@@ -22,7 +22,7 @@ from photogram.messages import Message
 from photogram.network.attitudes import angles_form, known_angles
 from photogram.network.block import Block
 from photogram.network.cameras import Camera
-from photogram.network.frame import Frame
+from photogram.network.geometry import Frame
 from photogram.network.moving_photos import Mount
 from photogram.network.observations import Control, Observation, Observations, Position
 from photogram.network.trajectories import Clock

@@ -19,8 +19,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.network.frame import Frame
-from photogram.network.geometry import local_frames
+from photogram.network.geometry import Frame, local_frames
 from photogram.network.refraction import METRES_PER_UNIT
 from photogram.words import Phrase, phrase
 

@@ -19,8 +19,7 @@ from photogram.network.block import Block, refuse_passages, refuse_trajectories
 from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
 from photogram.network.films import Scan
-from photogram.network.frame import Frame
-from photogram.network.geometry import Cartesian, Spheroid, lengths_of_units, local_frames
+from photogram.network.geometry import Cartesian, Frame, Spheroid, lengths_of_units, local_frames
 from photogram.network.motion import kept_images, on_shared, scanners
 from photogram.network.observations import Control, Position
 from photogram.network.rays import LocalAxes, image_directions, meet_rays

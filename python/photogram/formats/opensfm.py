@@ -34,7 +34,7 @@ from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
 from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
-from photogram.network.frame import Frame
+from photogram.network.geometry import Frame
 from photogram.network.observations import Observations, Position
 from photogram.words import Phrase, phrase
 

@@ -14,7 +14,7 @@ from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message
 from photogram.network.block import Block
-from photogram.network.frame import Frame as Frame
+from photogram.network.geometry import Frame as Frame
 from photogram.results.features import Definition
 from photogram.summaries import Brief
 from photogram.targets.board import Board

@@ -25,8 +25,7 @@ from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.attitudes import Attitudes, angles_form
 from photogram.network.block import Block
 from photogram.network.film_reduction import is_scanned
-from photogram.network.frame import Frame
-from photogram.network.geometry import Spheroid, lengths_of_units
+from photogram.network.geometry import Frame, Spheroid, lengths_of_units
 from photogram.network.observations import Control
 from photogram.results.features import Features, deviation_quantities, quantity_columns
 from photogram.results.footprints import metric_covariances

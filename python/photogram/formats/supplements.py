@@ -34,7 +34,7 @@ from photogram.network.equivalent_cameras import (
     with_one_focal_length,
     with_parameters,
 )
-from photogram.network.frame import Frame
+from photogram.network.geometry import Frame
 from photogram.network.motion import timed_photos
 from photogram.network.point_sets import similarity
 from photogram.results.result import Result

@@ -7,7 +7,7 @@ from typing import Literal
 from photogram.arguments.fields import Checked
 from photogram.giant.fields import format_deviations, format_real
 from photogram.giant.records import Record, Source
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 

@@ -20,7 +20,7 @@ from photogram.giant.fields import (
     texts,
 )
 from photogram.giant.records import Record, Source
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.words import phrase
 

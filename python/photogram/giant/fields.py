@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.io.records import parse_real
 from photogram.words import phrase
 

@@ -38,8 +38,7 @@ from photogram.network.block_checks import (
 )
 from photogram.network.cameras import Camera, CameraRow, camera_rows
 from photogram.network.films import reads_pixels
-from photogram.network.frame import Frame
-from photogram.network.geometry import Spheroid
+from photogram.network.geometry import Frame, Spheroid
 from photogram.network.moving_photos import Mount, Timed
 from photogram.network.observations import Observation, Observations, all_trajectories, moments, of_records
 from photogram.network.observations.columns import Group

@@ -12,7 +12,7 @@ from photogram.adjustment.adjustment import Progress
 from photogram.adjustment.prediction import predict
 from photogram.arguments.types import Floats
 from photogram.errors import InputError, PhotogramError, RankError, message_of
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
 from photogram.network.motion import on_shared

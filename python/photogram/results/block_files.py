@@ -13,7 +13,7 @@ from photogram.io.column_table import NameColumn
 from photogram.io.parquet import Column
 from photogram.io.writing import Content
 from photogram.messages import Message, Undetermined
-from photogram.network import cameras, core_arrays, films, frame, geometry, lens, moving_photos, refraction
+from photogram.network import cameras, core_arrays, films, geometry, lens, moving_photos, refraction
 from photogram.network import trajectories as motion
 from photogram.network.block import Block
 from photogram.network.motion import scanners
@@ -122,7 +122,7 @@ def _named(kind: str, names: list[str], rows: np.ndarray) -> Column:
 
 
 MODULES = (
-    *(cameras, core_arrays, films, frame, geometry, lens, motion, moving_photos),
+    *(cameras, core_arrays, films, geometry, lens, motion, moving_photos),
     *(refraction, datum, features, parts),
 )
 CLASSES = (Message, Phrase, Removed, Undetermined)

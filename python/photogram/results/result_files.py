@@ -25,7 +25,7 @@ from photogram.io.seals import SEAL, check_seal, check_sealed, recorded, seal
 from photogram.io.structure import Decoder, Encoder
 from photogram.io.writing import Content
 from photogram.lazy_dataclasses import dataclass
-from photogram.network.frame import Frame
+from photogram.network.geometry import Frame
 from photogram.results.network import AdjustedNetwork
 from photogram.show.quantity import Quantities
 from photogram.words import phrase

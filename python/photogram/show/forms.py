@@ -15,7 +15,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.arguments.types import Floats
 from photogram.io import json
-from photogram.io.angles import degrees_written
+from photogram.io.numbers import degrees_written
 from photogram.lazy_dataclasses import replace
 from photogram.show import page, quantity
 from photogram.show.page import (

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.io.angles import ARCSEC
 from photogram.io.csv_text import csv_text
+from photogram.io.numbers import ARCSEC
 from photogram.lazy_dataclasses import dataclass, replace
 
 if TYPE_CHECKING:

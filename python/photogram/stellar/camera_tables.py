@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.arguments.types import Floats
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.lazy_dataclasses import replace
 from photogram.show.quantity import Axis, Kind, Quantity, Table, component
 from photogram.statistics.findings import Findings, Tested

@@ -11,8 +11,8 @@ import numpy as np
 
 from photogram.arguments.fields import array, check_arrays, check_fields
 from photogram.arguments.types import Floats, Indices
-from photogram.io.angles import ARCSEC
 from photogram.io.delimited import read_records, renaming
+from photogram.io.numbers import ARCSEC
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.words import phrase
 

@@ -12,7 +12,7 @@ import numpy as np
 from photogram.arguments.objects import path_of, require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError, message_of
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.io.places import at_place
 from photogram.io.records import Record, Source, parse_integer, parse_real
 from photogram.stellar.parameters import GRAD, NAMES

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.lazy_dataclasses import replace
 from photogram.show.judgement import remarks_section, verdict_document, verdict_table
 from photogram.show.page import (

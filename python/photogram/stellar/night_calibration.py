@@ -15,7 +15,7 @@ import numpy as np
 
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError, PhotogramError, message_of
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.lazy_dataclasses import replace
 from photogram.messages import Message
 from photogram.statistics.weight_rules import LARGEST_FACTOR

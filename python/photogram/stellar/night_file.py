@@ -12,8 +12,8 @@ import numpy as np
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
-from photogram.io.angles import ARCSEC
 from photogram.io.delimited import read_records, renaming
+from photogram.io.numbers import ARCSEC
 from photogram.io.places import Place, at_place
 from photogram.io.toml import TomlTree, read_document
 from photogram.lazy_dataclasses import replace

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Bools
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.plots.accessor import drawings
 from photogram.plots.picture_data import Correlated, Curve, Curves, Images

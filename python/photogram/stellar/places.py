@@ -15,7 +15,7 @@ from photogram.arguments.fields import Checked
 from photogram.arguments.objects import require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.attitudes import Attitudes
 from photogram.stellar.catalogue import Catalogue

@@ -12,9 +12,9 @@ import numpy as np
 
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Bools, Floats
-from photogram.io.angles import ARCSEC
 from photogram.io.column_table import ColumnTable
 from photogram.io.delimited import read_records
+from photogram.io.numbers import ARCSEC
 from photogram.io.places import Place, at_place
 from photogram.io.toml import TomlTree, read_document, read_toml
 from photogram.lazy_dataclasses import fields, replace

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.io.angles import ARCSEC, degrees_minutes_seconds
+from photogram.io.numbers import ARCSEC, degrees_minutes_seconds
 from photogram.stellar.curves import star_means
 from photogram.stellar.parameters import GROUPS
 from photogram.stellar.sky import Site

@@ -15,7 +15,7 @@ from photogram.arguments.fields import Checked, array, check_arrays, check_field
 from photogram.arguments.objects import require, require_name
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError, failure_of_core
-from photogram.io.angles import ARCSEC
+from photogram.io.numbers import ARCSEC
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.stellar.parameters import COMMON, INDEX, NAMES
 from photogram.stellar.sky import TAU, Site

@@ -15,7 +15,7 @@ from photogram.arguments.fields import Checked, check_fields
 from photogram.arguments.objects import require
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.io.angles import ARCSEC as ARCSEC
+from photogram.io.numbers import ARCSEC as ARCSEC
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.words import phrase
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from photogram.arguments.types import Floats
-from photogram.io.angles import ARCSEC, degrees_minutes_seconds
+from photogram.io.numbers import ARCSEC, degrees_minutes_seconds
 from photogram.lazy_dataclasses import fields
 from photogram.show.page import about
 from photogram.show.quantity import Axis, Quantity, Table, component, of_each

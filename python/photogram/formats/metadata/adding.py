@@ -34,8 +34,7 @@ from photogram.formats.read_options import ReadOptions
 from photogram.io.csv_text import csv_text
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import Message
-from photogram.network.frame import Frame
-from photogram.network.geometry import Spheroid
+from photogram.network.geometry import Frame, Spheroid
 from photogram.network.observations import Position
 from photogram.network.point_sets import similarity
 from photogram.network.unknowns import LeverArm, Shift

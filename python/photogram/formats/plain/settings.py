@@ -25,7 +25,7 @@ from photogram.io.places import at_place
 from photogram.io.toml import TomlTree, quoted_text, read_document, read_toml
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.messages import Message, unknown_name
-from photogram.network.frame import Frame
+from photogram.network.geometry import Frame
 from photogram.results.features import KINDS, Definition
 from photogram.words import Phrase, phrase
 

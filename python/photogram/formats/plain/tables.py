@@ -37,7 +37,7 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes, Representation, angles_form, known_angles
 from photogram.network.block import Block
-from photogram.network.frame import Frame
+from photogram.network.geometry import Frame
 from photogram.network.observations import Observation, Observations
 from photogram.network.unknowns import Unknown
 from photogram.words import Phrase, phrase

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from photogram.arguments.types import Bools, Floats
-from photogram.io.angles import degrees_minutes_seconds
+from photogram.io.numbers import degrees_minutes_seconds
 from photogram.lazy_dataclasses import dataclass
 
 Page = list[str]  # The lines of a page below its banner
