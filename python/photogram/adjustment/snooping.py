@@ -267,7 +267,6 @@ def block_trial(
     *,
     control: str = "plan and height",
 ) -> NetworkTrial:
-    """Create the trial of a block for snooping, from the start or an adjusted state."""
     network = block_network(block, replace(options, covariance=True, loss=None))
     return network_trial(block, network.trial(state, threads=core_threads(threads)), control=control)
 

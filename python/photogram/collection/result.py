@@ -35,7 +35,6 @@ ROUGH, EXACT = 1e-7, 1e-12  # Relative decrease of the sum of squares that ends 
 
 
 def collection_network(given: Collection, options: CoreOptions) -> _photocore.CollectionNetwork:
-    """Create the core network that adjusts a collection and evaluates it afterwards."""
     return _photocore.collection_network(
         given.camera,
         given.photo_parameters,
@@ -86,7 +85,6 @@ def collection_trial(
     threads: int = 0,
     parts: bool = True,
 ) -> NetworkTrial:
-    """Create the trial of a collection for tests, from an adjusted state."""
     network = collection_network(collection, replace(options, covariance=True, loss=None))
     core = network.trial(state, threads=threads)
     return NetworkTrial(

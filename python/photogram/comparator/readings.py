@@ -284,7 +284,6 @@ def group(points: Indices) -> Indices:
 
 
 def rows_by_point(points: Indices) -> list[tuple[int, Indices]]:
-    """Return each point with the rows of its readings, in the order measured."""
     order = group(points)
     starts = np.flatnonzero(np.diff(points[order])) + 1
     rows = np.split(order, starts) if len(points) else []

@@ -246,7 +246,6 @@ def _exchanges(table: ColumnTable, values: Floats, *, free: bool) -> Iterator[Ex
 
 
 def _systems(project: Project, settings: Settings) -> tuple[str, ...]:
-    """Return possible systems of control without one, if the project is georeferenced."""
     if settings.crs.get("control") or project.frame.kind != "topocentric" or project.frame.origin is None:
         return ()
     return (utm_zone(*project.frame.origin[:2]), "EPSG:4979", "EPSG:3857")

@@ -201,7 +201,6 @@ def _first_images(
     image_points: Indices,
     messages: list[Message],
 ) -> Indices:
-    """Return the rows of the first image of every point in every photo, in order."""
     pairs = image_photos * (image_points.max() + 1) + image_points
     order = np.argsort(pairs, kind="stable")
     again = np.sort(order[1:][pairs[order[1:]] == pairs[order[:-1]]])

@@ -188,7 +188,6 @@ class _IrregularError(Exception):
 def _read(
     path: Path, header: Callable[[str], _Header], numbers: Collection[str], size: int | None
 ) -> Iterator[ColumnTable]:
-    """Yield a table whose header is at the beginning."""
     if path.suffix.lower() != ".xlsx" and path.is_file() and path.stat().st_size > LARGE:
         begin = read_beginning(path, LARGE).rpartition("\n")[0]
         # If the header is not at the beginning, the whole text is searched.

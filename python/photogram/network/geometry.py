@@ -20,6 +20,19 @@ from photogram.lazy_dataclasses import dataclass
 from photogram.network.refraction import Refraction
 from photogram.words import Phrase, phrase
 
+__all__ = [
+    "Spheroid",
+    "geocentric_to_geographic",
+    "geographic_to_geocentric",
+    "lengths_of_units",
+    "local_frames",
+    "project",
+    "refraction_shift",
+    "rotation_angles",
+    "rotation_matrix",
+    "viewing_directions",
+]
+
 
 @dataclass(frozen=True)
 class Frame:

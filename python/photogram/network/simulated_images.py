@@ -406,7 +406,6 @@ def _timed(
     times: Floats,
     motions: tuple[Floats, Floats],
 ) -> Block:
-    """Return a block with own motions of the photos, and a shutter for each camera."""
     cameras = _photo_cameras(block)
     names = block.camera_names if block.cameras else ["camera 1"]
     shutters = [

@@ -113,7 +113,6 @@ class View:
         return np.asarray(((self.points >= low) & (self.points <= high)).all(axis=1))
 
     def bar(self, scale: float, colour: str, meaning: str) -> ScaleBar:
-        """Return the scale bar of marks that are enlarged by `scale`."""
         length = round_length(0.12 * self.extent / scale)
         return scale * length, colour, f"{length:g}{self.unit}: {meaning} (× {scale:,g})"
 

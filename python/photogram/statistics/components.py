@@ -126,7 +126,6 @@ class Estimate:
 
 
 def helmert_step(matrix: Floats, squares: Floats, free: list[int]) -> Floats:
-    """Return Helmert factors for the free components, with the others fixed."""
     rows = np.array(free, dtype=np.int64)
     held = np.setdiff1d(np.arange(len(squares)), rows)
     right = squares[rows] - matrix[np.ix_(rows, held)].sum(axis=1)

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from itertools import chain
 from pathlib import Path
 from types import ModuleType
 
 from photogram.arguments.objects import path_of
 from photogram.collection.collection import Collection
-from photogram.collection.formats import bal, bundler
 from photogram.errors import InputError
 from photogram.io.packed_numbers import packed, pieces
 from photogram.memory import turned
 from photogram.words import phrase
 
 CAMERA = "bal"  # Camera model of all formats
-FORMATS: dict[str, ModuleType] = {"bundler": bundler, "bal": bal}
+FORMATS: dict[str, ModuleType] = {
+    name: import_module(f"photogram.collection.formats.{name}")
+    for name in (
+        "bundler",
+        "bal",
+    )
+}
 """Modules by name: `TITLE` for people, `SUFFIX` of written files, `begins` tests the beginning of unpacked
 content, `read` and `to_bytes` convert. The first matching format is used for a file."""
 

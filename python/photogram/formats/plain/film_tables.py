@@ -330,7 +330,6 @@ def read_certificates(tables: Tables) -> dict[str, Certificate]:
 def _valid(
     table: ColumnTable, camera: str, several: Sequence[Certificate], flown: Mapping[date | None, int]
 ) -> Certificate:
-    """Return the certificate of a camera that is valid on all of its flight dates."""
     from photogram.film.years import valid_certificate
 
     found: list[Certificate] = []

@@ -184,7 +184,6 @@ def _observations(
     fiducials: Mapping[str, Marks],
     covariances: Covariances,
 ) -> list[Observation]:
-    """Return the readings of marks, and the priors of films, marks and scanners."""
     found = list[Observation]()
     for photo, film in ((photo, scan.film) for photo, scan in zip(photos, scans, strict=True)):
         found += _known(photo, film, covariances)

@@ -265,7 +265,6 @@ Seams = Mapping[str, Seam]  # By photo name
 
 
 def with_seams(tables: Tables) -> tuple[Tables, Seams]:
-    """Return tables with divided scans, and the seams."""
     table = tables.read("photos")
     found: dict[str, Seam] = {}
     if table is None or not any(f"seam_{line}" in table for line in _LINES):

@@ -105,8 +105,6 @@ class Surface:
 
 @dataclass(frozen=True, eq=False)
 class PointTests:
-    """Tests of each of the n check points."""
-
     # (n, 3) square roots of the diagonals of C and s2 Q
     sd_predicted: Floats
     sd_adjusted: Floats

@@ -317,7 +317,6 @@ class Asprs:
 
     @property
     def control_good_enough(self) -> dict[str, bool]:
-        """Whether control is accurate enough for the classes, by `h` and `v`."""
         return {name: self.control_rmse[name] <= limit for name, limit in self.control_limits.items()}
 
 
