@@ -1,8 +1,9 @@
 """Collections of photos of unknown cameras: bundle adjustment "in the large"."""
 
 from photogram.collection.adjust import adjust
-from photogram.collection.collection import PARAMETERS, Collection
+from photogram.collection.collection import Collection
 from photogram.collection.formats import read, to_bytes
+from photogram.collection.parameters import PARAMETERS
 from photogram.collection.result import AdjustedCollection
 from photogram.collection.simulation import Simulation, simulate, simulate_turntable
 

@@ -12,6 +12,7 @@ from photogram.arguments.arrays import length
 from photogram.arguments.equality import Valued
 from photogram.arguments.fields import array, check_arrays
 from photogram.arguments.types import FREE, ONE, Array, Floats, IndexArray
+from photogram.collection.parameters import POSE, parameters_of
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import converting_dataclass, field, replace
 from photogram.network.block import span
@@ -29,17 +30,6 @@ if TYPE_CHECKING:
     from photogram.network.core_arrays import CoreOptions
     from photogram.results.grouping import Grouping, Observables
     from photogram.results.snooping_options import SnoopOptions
-
-
-POSE = ("w1", "w2", "w3", "t1", "t2", "t3")  # Angle-axis vector w (rad) and translation t of a photo
-PARAMETERS = (*POSE, "f", "k1", "k2")  # Photo with the camera `bal`: also f (pixels), k1, k2
-
-
-def parameters_of(camera: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return names and units of the k parameters of a photo with this camera model."""
-    powers = camera_facts(camera)[1]
-    units = ("rad",) * 3 + ("",) * 3 + tuple("px" if power == 1 else "" for _, power in powers)
-    return (*POSE, *(name for name, _ in powers)), units
 
 
 @converting_dataclass(frozen=True, eq=False, repr=False)

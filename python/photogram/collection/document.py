@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from photogram.collection.collection import POSE
+from photogram.collection.parameters import POSE
 from photogram.plots.accessor import drawings
 from photogram.results.network_document import network_document, network_members, size_section, used_fact
 from photogram.results.network_sections import control_section, stations_section

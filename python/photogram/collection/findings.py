@@ -9,7 +9,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Bools, Floats, Indices
-from photogram.collection.collection import POSE
+from photogram.collection.parameters import POSE
 from photogram.results.findings import network_findings
 from photogram.results.fixed_tests import SUSPECTED, Held, held_tests
 from photogram.results.patterns import CameraImages, patterns

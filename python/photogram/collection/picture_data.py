@@ -10,7 +10,7 @@ import numpy as np
 
 from photogram import _photocore
 from photogram.arguments.types import Floats, Indices
-from photogram.collection.collection import POSE
+from photogram.collection.parameters import POSE
 from photogram.network.cameras import Camera
 from photogram.plots.picture_data import Correlated, Curve, Curves, Plan
 from photogram.results.distortion import RADIAL, added_along, curve_deviations, radial_curve, radial_part

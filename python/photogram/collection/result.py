@@ -10,7 +10,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.adjustment.remarks import too_coarse
 from photogram.arguments.types import Floats, Indices
-from photogram.collection.collection import POSE
+from photogram.collection.parameters import POSE
 from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.memory import available_memory
@@ -23,10 +23,12 @@ from photogram.words import Phrase, phrase
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from photogram import _photocore
+    import pandas as pd
+
     from photogram.collection import Collection
     from photogram.io.writing import Content
     from photogram.results.parts import Terms
+    from photogram.results.reliability import ReliabilitySummary
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
@@ -153,6 +155,11 @@ class AdjustedCollection(AdjustedNetwork):
 
         return collection_findings(self)
 
+    def _table(self, what: str) -> pd.DataFrame:
+        from photogram.results.tables import table_frame
+
+        return table_frame(self, what)
+
     def _files(self) -> Mapping[str, Content]:
         from photogram.collection.result_files import collection_files
 
@@ -163,6 +170,13 @@ class AdjustedCollection(AdjustedNetwork):
         from photogram.collection.document import collection_document
 
         return collection_document(self)
+
+    @cached_property
+    def reliability_summary(self) -> ReliabilitySummary | None:
+        """The reliability summary of reports; see `AdjustedNetwork`."""
+        from photogram.results.evaluation import reliability_summary
+
+        return reliability_summary(self)
 
     @property
     def given(self) -> Collection:

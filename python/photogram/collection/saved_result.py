@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from photogram.collection.collection import Collection, parameters_of
+from photogram.collection.collection import Collection
+from photogram.collection.parameters import parameters_of
 from photogram.collection.result import AdjustedCollection
 from photogram.collection.result_files import collection_parts
 from photogram.messages import Message

@@ -18,8 +18,8 @@ from photogram.adjustment.snooping import finished, gone, used_images
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats, Indices
 from photogram.collection.adjust import adjust, adjusted
-from photogram.collection.collection import POSE
 from photogram.collection.findings import collection_held
+from photogram.collection.parameters import POSE
 from photogram.collection.result import AdjustedCollection, collection_trial
 from photogram.diagnosis.diagnose import check_block
 from photogram.diagnosis.findings import Diagnosis, Section

@@ -19,10 +19,10 @@ from photogram.distributed.nodes import read_outcome
 from photogram.distributed.run import Manifest, read_node, result_folder
 from photogram.errors import AdjustmentError
 from photogram.network.block import Block
-from photogram.results.block_files import read_block_result
 from photogram.results.datum import datum_of
 from photogram.results.result import Result
 from photogram.results.result_files import read_summary
+from photogram.results.saved_block import read_block_result
 from photogram.words import phrase
 
 if TYPE_CHECKING:

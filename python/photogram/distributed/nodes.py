@@ -19,10 +19,11 @@ from photogram.lazy_dataclasses import replace
 from photogram.network.block import Block
 from photogram.network.core_arrays import block_network
 from photogram.network.datum import DatumRow
-from photogram.results.block_files import block_files, read_block_result
+from photogram.results.block_files import block_files
 from photogram.results.datum import datum_of, refused
 from photogram.results.result import Result
 from photogram.results.result_files import read_summary
+from photogram.results.saved_block import read_block_result
 
 if TYPE_CHECKING:
     from photogram._photocore import BlockSolution

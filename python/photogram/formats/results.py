@@ -61,7 +61,7 @@ def read_result(directory: str | PathLike[str]) -> Result | AdjustedCollection:
     from photogram.collection.result_files import KIND as COLLECTION
     from photogram.collection.saved_result import read_collection_result
     from photogram.results.block_files import KIND as BLOCK
-    from photogram.results.block_files import read_block_result
+    from photogram.results.saved_block import read_block_result
 
     readers: Mapping[str, Callable[[Path, Mapping[str, Any]], Result | AdjustedCollection]] = {
         BLOCK: read_block_result,

@@ -1,11 +1,9 @@
-"""Files of the result of a block: writing and reading (`docs/results.md`)."""
+"""Files of the result of a block (`docs/results.md`)."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,13 +13,11 @@ from photogram.io.writing import Content
 from photogram.messages import Message, Undetermined
 from photogram.network import cameras, core_arrays, films, geometry, lens, moving_photos, refraction
 from photogram.network import trajectories as motion
-from photogram.network.block import Block
 from photogram.network.motion import scanners
 from photogram.network.observations import Observation
 from photogram.network.passages import Passage
 from photogram.network.unknowns import Unknown
 from photogram.results import datum, features, parts
-from photogram.results.result import Result
 from photogram.results.result_files import (
     GIVEN_SD,
     REDUNDANCY,
@@ -29,14 +25,15 @@ from photogram.results.result_files import (
     Part,
     image_parts,
     point_parts,
-    read_saved,
-    rows_of,
     sheet,
     written,
 )
 from photogram.results.tables import TABLE_FILES, TABLES
 from photogram.statistics.findings import Removed
 from photogram.words import Phrase
+
+if TYPE_CHECKING:
+    from photogram import Result
 
 KIND = "block"
 _ANGLES = ("omega", "phi", "kappa")
@@ -141,28 +138,3 @@ def saved_classes() -> list[type]:
         own: list[Any] = bases.pop().__subclasses__()
         found, bases = [*found, *own], [*bases, *own]
     return found
-
-
-def read_block_result(folder: Path, document: Mapping[str, Any]) -> Result:
-    """Return the result from a folder; refuse missing, damaged or wrong files."""
-    saved = read_saved(folder, saved_classes(), document)
-    given = saved.members("block", Block)
-    images, names = saved.sheets["images"], {}
-    for kind in ("photo", "point"):
-        sheet = saved.sheets[f"{kind}s"]
-        own = sheet.names(kind)
-        names[kind] = (
-            own.names if (own.rows == np.arange(len(own))).all() else [own.names[k] for k in own.rows]
-        )
-        given[f"{kind}_ids"] = names[kind]
-        given[f"image_{kind}s"] = rows_of(images.names(kind), names[kind], images.path)
-    units = {"unit": given["linear_unit"], "image_unit": str(document["image_unit"])}
-    parts = parts_of_block(geographic=given["spheroid"] is not None, **units)
-    own_arrays, block_arrays = saved.arrays(parts, "block")
-    block = Block(**given | block_arrays)
-    members = saved.members("result", Result)
-    if block.timed or any(each.knot_unknowns for each in block.cameras):
-        # Coefficients of photos with their own trajectories, and knots, are created with their block.
-        pairs = zip(members["unknowns"], block.unknowns, strict=True)
-        members["unknowns"] = tuple(replace(each, given=own) for each, own in pairs)
-    return Result(**members, **own_arrays, block=block, state=saved.state())

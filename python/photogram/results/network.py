@@ -313,15 +313,13 @@ class AdjustedNetwork(Valued, Judged, Documented, ABC):
             trial.out = lost.out
         return Reliability(trial, self.covariances, lost, level=level, power=power, unit_weight=unit_weight)
 
-    @cached_property
+    @property
+    @abstractmethod
     def reliability_summary(self) -> ReliabilitySummary | None:
         """The reliability summary of reports, with tests of all groups.
 
         None without redundancy numbers or convergence.
         """
-        from photogram.results.evaluation import reliability_summary
-
-        return reliability_summary(self)
 
     def _hypothesis_facts(self) -> dict[str, Any]:
         """Return additional facts for hypotheses; empty by default."""
@@ -479,12 +477,9 @@ class AdjustedNetwork(Valued, Judged, Documented, ABC):
     @abstractmethod
     def _files(self) -> Mapping[str, Content]: ...
 
+    @abstractmethod
     def _table(self, what: str) -> pd.DataFrame:
         """Return a table by the type of its items."""
-        from photogram.results.tables import TABLES
-        from photogram.show.quantity import Table
-
-        return Table(what, "", TABLES[what](self)).frame()
 
     def photo_table(self) -> pd.DataFrame:
         """Return adjusted photos as a data frame: values, sd, attitudes in degrees."""

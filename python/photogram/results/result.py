@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from photogram.results.calibration import Calibration
     from photogram.results.network_trial import NetworkTrial
     from photogram.results.parts import Terms
+    from photogram.results.reliability import ReliabilitySummary
     from photogram.show.page import Document
     from photogram.statistics.findings import Findings
 
@@ -212,6 +213,13 @@ class Result(OnFilm, AdjustedNetwork):
 
         return calibrations(self)
 
+    @cached_property
+    def reliability_summary(self) -> ReliabilitySummary | None:
+        """The reliability summary of reports; see `AdjustedNetwork`."""
+        from photogram.results.evaluation import reliability_summary
+
+        return reliability_summary(self)
+
     def _plot_data(self) -> Any:
         from photogram.results.picture_data import PicturedBlock
 
@@ -310,7 +318,9 @@ class Result(OnFilm, AdjustedNetwork):
         )
 
     def _table(self, what: str) -> pd.DataFrame:
-        table = super()._table(what)
+        from photogram.results.tables import table_frame
+
+        table = table_frame(self, what)
         table.attrs["datum"] = str(self.datum)
         return table
 

@@ -26,13 +26,15 @@ from photogram.results.network_tables import (
 )
 from photogram.results.network_trial import KINDS, OBSERVATION, type_name
 from photogram.show.forms import unit_written
-from photogram.show.quantity import Axis, Link, Quantity, column, component, joined, long
+from photogram.show.quantity import Axis, Link, Quantity, Table, column, component, joined, long
 from photogram.statistics.distributions import lambda0
 from photogram.statistics.findings import Tested
 from photogram.statistics.reliability import TESTABLE, minimal_detectable_error
 from photogram.words import Phrase, phrase
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from photogram import Result
     from photogram.results.network import AdjustedNetwork
 
@@ -409,3 +411,8 @@ TABLE_FILES = {
     "feature_deviations": "deviation",
 }
 """Files with the kinds of their tables, without those of photos, points and images."""
+
+
+def table_frame(result: AdjustedNetwork, what: str) -> pd.DataFrame:
+    """Return a table of a result as a data frame."""
+    return Table(what, "", TABLES[what](result)).frame()
