@@ -256,12 +256,12 @@ def _boresight(sites: _Sites, boresight: Unknown, own: Sequence[Observation]) ->
 
 def _sensor(sites: _Sites, sensor: Unknown, own: Sequence[Observation]) -> Unknown:
     known, places, turns = sites.known, [], []
-    for each in sites.block.mounts:
+    for each in (mount for mount in sites.block.mounts if mount.sensor is sensor):
         frame, photo = sites.photos[each.frame], sites.photos[each.photo]
         to_frame = known.attitudes[frame].T
         place = to_frame @ (known.positions[photo] - known.positions[frame])
         turn = to_frame @ known.attitudes[photo]
-        if each.sensor is sensor and np.isfinite(place).all() and np.isfinite(turn).all():
+        if np.isfinite(place).all() and np.isfinite(turn).all():
             places.append(place)
             turns.append(turn)
     flown = [each.photo for each in sites.block.timed if each.sensor is sensor]

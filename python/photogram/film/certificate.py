@@ -189,7 +189,9 @@ class Certificate(Documented, Judged):
     def check(self) -> tuple[DistanceDifference, ...]:
         """Compare distances with coordinates and explain differences beyond 0.010 mm."""
         figures = {
-            f"{mark}.{axis}": repr(xy["xy".index(axis)]) for mark, xy in self.places.items() for axis in "xy"
+            f"{mark}.{axis}": repr(value)
+            for mark, xy in self.places.items()
+            for axis, value in zip("xy", xy, strict=True)
         }
         figures |= {each.name: repr(each.length) for each in self.distances} | dict(self.typed)
         return tuple(

@@ -61,11 +61,11 @@ def read(path: Path, options: ReadOptions) -> Project:
         np.broadcast_to(options.sd.get(kind, (settings.get(f"accuracy_{name}", np.nan),)), 3)
         for kind, name in (("gnss", "cameras"), ("control", "markers"))
     )
-    references = {shot.attributes["id"]: (shot, _reference(shot, gnss_sd)) for shot in shots}
     lost = 0
-    for key, (shot, (xyz, sd, enabled)) in references.items() if system is not None else ():
+    for shot in shots if system is not None else ():
+        xyz, sd, enabled = _reference(shot, gnss_sd)
         if enabled and (sd > 0).all():
-            block.gnss(key, xyz, sd, shot, crs=system or "")
+            block.gnss(shot.attributes["id"], xyz, sd, shot, crs=system or "")
         lost += enabled and not (sd > 0).all()
     if lost:
         block.lacks.append(Phrase("read.references", {"number": lost, "option": option_sd("gnss")}))

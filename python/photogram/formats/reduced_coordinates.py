@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.arguments.types import Bools, Floats
+from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
 from photogram.formats.cards import END, Card, cards, file_of, one_file
@@ -32,6 +32,7 @@ from photogram.io.numbers import scaled
 from photogram.io.places import Place, one_word
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes
+from photogram.network.block import Block
 from photogram.network.block_checks import known_poses
 from photogram.network.cameras import Camera
 from photogram.network.rays import image_directions
@@ -160,16 +161,22 @@ def reduced_images(project: Project, digits: int | None = None) -> tuple[Floats,
     )
     if digits is not None:
         distances = distances.round(digits)
-    directions = image_directions(block)
-    with np.errstate(invalid="ignore"):
-        rows = np.flatnonzero(directions[:, 2] < SIDE)
-    photos, rays = block.image_photos[rows], directions[rows]
+    rows, rays = _in_front(block)
+    photos = block.image_photos[rows]
     xy = distances[np.asarray(which, dtype=np.int64)[photos], np.newaxis] * rays[:, :2] / -rays[:, 2:]
     images: _Images = [[] for _ in block.photo_ids]
     points = block.image_points[rows]
     for photo, point, (x, y) in zip(photos.tolist(), points.tolist(), xy.tolist(), strict=True):
         images[photo].append((block.point_ids[point], x, y))
     return distances, images
+
+
+def _in_front(block: Block) -> tuple[Indices, Floats]:
+    """Return rows and directions of the observations that a perspective camera can have."""
+    directions = image_directions(block)
+    with np.errstate(invalid="ignore"):
+        rows = np.flatnonzero(directions[:, 2] < SIDE)
+    return rows, directions[rows]
 
 
 def given_control(project: Project) -> dict[str, tuple[Floats, Bools]]:
@@ -184,7 +191,7 @@ def lost_of_reduced(project: Project) -> list[Phrase]:
     found = []
     if any(camera.unit == "px" for camera in known_cameras(project.block)[0]) and None in project.pixel_mm:
         found.append(phrase("lost.nominal-distance", distance=NOMINAL))
-    if lost := len(project.block.image_xy) - sum(map(len, reduced_images(project)[1])):
+    if lost := len(project.block.image_xy) - len(_in_front(project.block)[0]):
         found.append(phrase("lost.images", n=lost))
     return found
 

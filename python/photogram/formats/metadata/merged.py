@@ -65,9 +65,9 @@ class _Sources:
                 low.append(key)
             deviations = next((each for each in sources if each.sd is not None), None)
             photos[key] = PhotoRecord(key, self.flights[key], position, deviations)
-        if low:
-            self.messages.append(Message.of("photos.heightless", self.path, n=len(low), names=low))
         pictures, remarks = tuple(self.pictures.values()), tuple(self.messages)
+        if low:
+            remarks += (Message.of("photos.heightless", self.path, n=len(low), names=low),)
         return Metadata(self.path, photos, tuple(self.tables), pictures, remarks)
 
 

@@ -142,18 +142,17 @@ def read_exposures(path: Path, *, antenna: bool) -> dict[int, Said]:
     """
     found: dict[int, Said] = {}
     for place in filled_lines(path):
-        said = _exposure(place, antenna)
-        number = place.whole((place.text or "").split("\t")[0].strip(), "number", highest=10**6)
+        number, said = _exposure(place, antenna)
         if found.setdefault(number, said) is not said:
             raise place.error(phrase("format.repeated", what="exposure", name=str(number)))
     return found
 
 
-def _exposure(place: Place, antenna: bool) -> Said:
+def _exposure(place: Place, antenna: bool) -> tuple[int, Said]:
     cells = [each.strip() for each in (place.text or "").split("\t")]
     if len(cells) < 11:
         raise place.error(phrase("format.words", n=len(cells), required="11 words between tabs"))
-    _, seconds, week, *rest = cells
+    number, seconds, week, *rest = cells
     if not (week.startswith("[") and week.endswith("]")):
         raise place.error(phrase("photos.week", value=week))
     parts = [[each.strip() for each in cell.split(",")] for cell in rest]
@@ -179,7 +178,8 @@ def _exposure(place: Place, antenna: bool) -> Said:
             height - down,
         )
     sd = usable_deviations(east, north, up) if flag else None
-    return Said(".MRK", place, ELLIPSOIDAL, "", position, sd, rtk=flag != 0, flag=flag)
+    said = Said(".MRK", place, ELLIPSOIDAL, "", position, sd, rtk=flag != 0, flag=flag)
+    return place.whole(number, "number", highest=10**6), said
 
 
 SOURCE = "RTKLIB"

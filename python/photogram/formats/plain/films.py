@@ -156,25 +156,19 @@ def _starts(
     for name, certificate in cameras.certificates.items():
         if beyond := beyond_message(by_name[name], certificate, photos):
             tables.messages.append(Message(beyond, certificate.file))
-    starts = []
-    for photo in photos:
-        # The nearest photo on the same film and scanner
-        near = sorted(photos, key=lambda other, row=photo.row: abs(other.row - row))  # type: ignore[misc]
-        alike = (
-            other
-            for other in near
-            if (other.kind is photo.kind and other.machine is photo.machine)
-            and (other.start is not None and other.mirrored == photo.mirrored)
-        )
-        if (start := photo.start) is None:
-            if (other := next(alike, None)) is None:
-                message = phrase("plain.no-film-start", photo=photo.name, columns=list(_START))
-                raise table.error(photo.row, message)
+    return [_start(tables, table, photo, photos) for photo in photos]
+
+
+def _start(tables: Tables, table: ColumnTable, photo: ScannedPhoto, photos: Sequence[ScannedPhoto]) -> Floats:
+    """Return initial values of a photo, or of the nearest one on its film and scanner."""
+    if photo.start is not None:
+        return photo.start
+    for other in sorted(photos, key=lambda each: abs(each.row - photo.row)):
+        same = other.kind is photo.kind and other.machine is photo.machine
+        if other.start is not None and same and other.mirrored == photo.mirrored:
             tables.remark("plain.film-start", photo=photo.name, other=other.name)
-            start = other.start
-        assert start is not None
-        starts.append(start)
-    return starts
+            return other.start
+    raise table.error(photo.row, phrase("plain.no-film-start", photo=photo.name, columns=list(_START)))
 
 
 def _observations(

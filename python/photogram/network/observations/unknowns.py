@@ -397,9 +397,9 @@ def with_knots(
 
     Priors of knots of other cameras are removed.
     """
-    own = [knot for camera in cameras for knot in camera.knot_unknowns]
+    own = dict.fromkeys(knot for camera in cameras for knot in camera.knot_unknowns)
     observed = {each.unknown: each for each in observations.of_type(Prior)}
-    others = {prior for knot, prior in observed.items() if isinstance(knot, Knot) and knot not in set(own)}
+    others = {prior for knot, prior in observed.items() if isinstance(knot, Knot) and knot not in own}
     if others:
         observations = Observations.of(each for each in observations if each not in others)
     weighted = [each for each in own if each.covariance is not None and each not in observed]
