@@ -7,7 +7,8 @@ import pytest
 
 import photogram
 from fuzz.networks import random_network
-from photogram import adjust
+from photogram import _photocore, adjust
+from photogram.results.network_trial import NO_FACTS
 
 TESTED = ("active", "rank", "statistic", "least", "residual", "redundancy", "error", "error_sd")
 SEED = 5
@@ -93,3 +94,23 @@ def test_verdicts_do_not_depend_on_threads(monkeypatch):
         monkeypatch.setattr("photogram.results.findings.IN_PARALLEL", sizes)
         documents.append(adjust(block).verdict.document())
     assert documents[0] == documents[1]
+
+
+@pytest.mark.parametrize("loss", [None, "huber"])
+def test_large_networks_end_their_trial_with_the_hypotheses(monkeypatch, loss):
+    block = photogram.simulate(strips=2, photos_per_strip=6, seed=SEED).block
+    waiting, ended = (adjust(block, loss=loss, covariance="verdict") for _ in range(2))
+    expected = repr(waiting.reliability_summary.document())
+    monkeypatch.setattr("photogram.results.evaluation.MOST_WAITING", 0)
+    assert repr(ended.reliability_summary.document()) == expected
+
+
+def test_an_ended_trial_has_no_tests():
+    block = photogram.simulate(strips=2, photos_per_strip=4, points_per_photo=40, seed=7).block
+    trial = adjust(block)._trial()
+    trial.stand()
+    facts = {**NO_FACTS, "estimated": None, "detection": (0.001, 0.8), "limit": 5.0, "effects": 4}
+    found = [trial.core.hypotheses(**facts, last=last)["statistic"] for last in (False, True)]
+    np.testing.assert_array_equal(*found)
+    with pytest.raises(_photocore.BlockError):
+        trial.tests()
