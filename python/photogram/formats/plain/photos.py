@@ -95,10 +95,9 @@ def cameras_of(table: ColumnTable, names: Sequence[str]) -> list[int]:
     only = names[0] if len(names) == 1 else ""
     if "camera" not in table and not only:
         raise table.head.error(phrase("plain.which-camera", count=len(names)))
-    texts = table.texts("camera", only)
-    for row in (row for row, name in enumerate(texts) if name not in names):
-        raise table.unknown_error(row, "camera", "camera", texts[row], names)
-    places = {name: row for row, name in enumerate(names)}
+    texts, places = table.texts("camera", only), {name: row for row, name in enumerate(names)}
+    for row in (row for row, name in enumerate(texts) if name not in places):
+        raise table.unknown_error(row, "camera", "camera", texts[row], places)
     return [places[name] for name in texts]
 
 
