@@ -272,11 +272,9 @@ class _Row:
             need = {"name": f"the model {model}", "other": "width and height"}
             raise table.error(row, phrase("error.requires", **need))
         # A single focal length applies to both axes.
-        spread = "f" not in own and "fx" in own
+        focal = ("fx", "fy") if "f" not in own and "fx" in own else ("f",)
         parameters, deviations = (
-            {"fx": each["f"], "fy": each["f"], **{k: v for k, v in each.items() if k != "f"}}
-            if spread and "f" in each
-            else each
+            {name: value for k, value in each.items() for name in (focal if k == "f" else (k,))}
             for each in (known, self.deviations)
         )
         if strange := [name for name in parameters if name not in own and parameters[name] != 0]:
