@@ -132,10 +132,15 @@ def test_threads_create_one_class_at_once(frozen):
                 def __post_init__(self):
                     object.__setattr__(self, "third", self.first + 1)
 
-            ready, made = threading.Barrier(4), []
+            @lazy_dataclasses.dataclass(frozen=frozen)
+            class Derived(Shared):
+                fourth: int = 4
 
-            def create(kind=Shared, ready=ready, made=made):
+            ready, made, names = threading.Barrier(4), [], set()
+
+            def create(kind=Derived, ready=ready, made=made, names=names):
                 ready.wait()
+                names.add(tuple(each.name for each in dataclasses.fields(kind)))
                 made.append(kind(first=1))
 
             threads = [threading.Thread(target=create) for _ in range(4)]
@@ -143,7 +148,8 @@ def test_threads_create_one_class_at_once(frozen):
                 thread.start()
             for thread in threads:
                 thread.join()
-            assert made == [Shared(1)] * 4
+            assert names == {("first", "second", "fourth")}
+            assert made == [Derived(1)] * 4
             assert [one.third for one in made] == [2] * 4
     finally:
         sys.setswitchinterval(interval)

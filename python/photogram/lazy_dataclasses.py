@@ -18,6 +18,7 @@ _Kind = TypeVar("_Kind")
 
 MAKING = RLock()
 APART = {"__repr__", "__eq__", "__hash__"}  # Methods created later: few classes need them
+REPLACED = {"__dataclass_fields__", "__dataclass_params__"}  # `dataclasses` overwrites them when complete
 
 
 class _Later:
@@ -36,11 +37,11 @@ class _Later:
                 for name in waiting & APART:
                     setattr(self.of, name, vars(other)[name])
             elif self.name in waiting:
-                # Other threads wait at the placeholder of `__init__`; without it, they would call a base.
+                # Other threads wait at the placeholders that remain; without them, they would see a base.
                 init = "__init__" in waiting and active_count() > 1
                 if init and not self.of.__doc__:
                     self.of.__doc__ = self.of.__name__  # Otherwise the signature, which `__init__` defines
-                for name in waiting - APART - ({"__init__"} if init else set()):
+                for name in waiting - APART - REPLACED - ({"__init__"} if init else set()):
                     delattr(self.of, name)
                 dataclasses.dataclass(**(self.options | {"repr": False, "eq": False}))(self.of)
                 if init:
