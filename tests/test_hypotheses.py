@@ -21,7 +21,7 @@ from photogram import (
     simulate,
     snoop,
 )
-from photogram.network import Attitude, rotation_matrix
+from photogram.network import Attitude, OnPlumbLine, PlumbLine, rotation_matrix
 from photogram.results.findings import duplicates
 from photogram.statistics.findings import IMAGES, Removed
 from photogram.words import phrase
@@ -249,6 +249,16 @@ def test_equal_readings_of_a_repeated_distance_are_not_duplicates():
     *gnss, distance = block.observations
     rounded = replace(distance, length=round(distance.length, 2), sd=0.01)
     assert not duplicates(block.replace(observations=[*gnss, rounded, rounded]))
+
+
+def test_points_that_are_on_one_line_twice_are_named():
+    """Their condition has no observed value."""
+    block, line = block_of("clean"), PlumbLine("pole")
+    a, b, c = (OnPlumbLine(name, line, sd=0.01) for name in block.point_ids[:3])
+    (message,) = duplicates(block.replace(observations=[a, b, c, b]))
+    assert (message.code, message.fields["n"]) == ("duplicates.observations", 1)
+    assert b.point in message.fields["names"][0]
+    assert not duplicates(block.replace(observations=[a, b, c]))
 
 
 def test_repeated_exposures_from_one_station_are_not_duplicates():

@@ -290,7 +290,7 @@ def _repeated(block: Block) -> Iterator[str]:
                 seen.add(key)
                 continue
             sd = math.sqrt(float(np.asarray(table["precision"][row]).diagonal().max()))
-            # The unit of the last decimal of the value with the most decimals.
+            # The unit of the last decimal of the value with the most decimals; conditions have no values.
             decimals = (repr(value).partition("e")[0].partition(".")[2].rstrip("0") for value in key[3])
-            if 10.0 ** -max(map(len, decimals)) < ROUNDED * sd:
+            if 10.0 ** -max(map(len, decimals), default=math.inf) < ROUNDED * sd:
                 yield f"{columns.label} {' - '.join(key[0][0] + key[0][1])}"
