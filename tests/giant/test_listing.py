@@ -283,6 +283,12 @@ def test_section_10_residuals_of_a_point_on_many_frames():
     assert lines[2] == ["0"] * 10
 
 
+def test_residuals_beyond_all_integers_are_printed_as_they_are():
+    (page,) = residual_pages([("P", ["F"], np.array([[1e17, np.nan]]))], 0.0, [])
+    lines = [line.split() for line in page if line][2:]
+    assert lines == [["P", "F"], ["1" + 20 * "0"], []]
+
+
 @pytest.mark.giant("10", "triangulated points residuals")
 @pytest.mark.giant("7", "degrees of freedom not positive: reported, undefined, scale 1")
 def test_section_10_without_degrees_of_freedom_the_estimates_are_undefined():
