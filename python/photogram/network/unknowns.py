@@ -106,7 +106,8 @@ class Unknown:
 
     def _set(self, name: str, value: Floats) -> None:
         if not np.isfinite(value).all() and name != "deviations":
-            raise argument_error(f"value of {self.title}", "finite", value=value.tolist())
+            what = " or ".join(self.GIVEN) or "value"
+            raise argument_error(f"{what} of {self.title}", "finite", value=value.tolist())
         object.__setattr__(self, name, value)
 
     def _position(self) -> Floats:
