@@ -71,9 +71,10 @@ def shaped(
         else:
             raise argument_error(name, "shape", shape=str(shape).replace("None", "n"), actual=array.shape)
     if rule and not (good := RULES[rule](array)).all():
-        for first in np.argwhere(~(good | (missing & np.isnan(array)))).tolist():
-            where = f"{name}[{', '.join(map(str, first))}]" if first else name
-            raise _rule_error(where, rule, float(array[tuple(first)]))
+        wrong = np.argwhere(~(good | (missing & np.isnan(array)))).tolist()
+        if wrong:
+            where = f"{name}[{', '.join(map(str, wrong[0]))}]" if wrong[0] else name
+            raise _rule_error(where, rule, float(array[tuple(wrong[0])]))
     return frozen(array)
 
 

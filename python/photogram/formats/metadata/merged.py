@@ -323,9 +323,8 @@ def remarks_on(records: Iterable[PhotoRecord]) -> list[Message]:
     remarks: dict[str, int] = {}
     for each in records:
         sources = [source for source in (each.deviations, each.position) if source is not None]
-        for source in sources[:1]:
-            if source.remark:
-                remarks[source.remark] = remarks.get(source.remark, 0) + 1
+        if sources and (remark := sources[0].remark):
+            remarks[remark] = remarks.get(remark, 0) + 1
         fix = next((source.fix for source in sources if source.fix), FIXED)
         if fix != FIXED:
             fixes.setdefault(fix, []).append(each.photo)
