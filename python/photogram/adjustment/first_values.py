@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from photogram import _photocore
 from photogram.adjustment.adjustment import adjust
 from photogram.adjustment.first_features import Known, with_poses
-from photogram.arguments.arrays import truth_value
+from photogram.arguments.arrays import by_key, truth_value
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
@@ -418,9 +418,7 @@ def _reason(kind: str, count: int, photos: int) -> Phrase:
 
 
 def _reasons(missing: dict[str, str]) -> str:
-    by_reason: dict[str, list[str]] = {}
-    for photo, reason in missing.items():
-        by_reason.setdefault(reason, []).append(photo)
+    by_reason = by_key((reason, photo) for photo, reason in missing.items())
     return "; ".join(f"{listed(photos)}: {reason}" for reason, photos in by_reason.items())
 
 
