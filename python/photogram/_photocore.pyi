@@ -99,18 +99,7 @@ def chi_square(x: float, dof: float, *, upper: bool = True) -> float:
 def chi_square_quantile(probability: float, dof: float, *, upper: bool = True) -> float:
     """Return the value that a chi-square variable exceeds (`upper`) with a probability.
 
-    Parameters
-    ----------
-    probability
-        Between 0 and 1; small values on either side retain their precision.
-    dof
-        Degrees of freedom, positive, not necessarily whole.
-    upper
-        Whether it is the probability of larger values.
-
-    Returns
-    -------
-    NaN for arguments outside these ranges.
+    It is the inverse of :func:`chi_square`; small probabilities on either side retain their precision.
     """
 
 def normal(z: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -479,7 +468,7 @@ def find_first_values(
         (m, 3) unit directions in the axes of the photos, not finite if undefined, and (m,) their standard
         deviations in radians.
     threads
-        As in `block_network`.
+        As in :class:`BlockNetwork`.
 
     Returns
     -------
@@ -653,7 +642,8 @@ class BlockNetwork:
         row). An exception that it raises stops the work. Signals are checked at the same time, so that Ctrl-C
         also stops it.
 
-    Methods raise BlockError for a block that cannot be adjusted or transformed to a datum.
+    Methods raise BlockError, before the first iteration if possible, for a block that cannot be adjusted or
+    transformed to a datum.
     """
 
     def adjust(
@@ -698,11 +688,6 @@ class BlockNetwork:
         """Return unknowns that an adjustment fixes to define the datum; empty if not needed.
 
         Photos, each with the index (0 to 5) of one of its unknowns.
-
-        Raises
-        ------
-        BlockError
-            As in :meth:`adjust`, before its first iteration.
         """
 
     def parts_in_datum(
@@ -747,8 +732,6 @@ class BlockNetwork:
 
         Raises
         ------
-        BlockError
-            As in :meth:`adjust` with a datum.
         BlockInputError
             If the names are not the names of all unknowns.
         """
@@ -792,8 +775,6 @@ class BlockNetwork:
         ------
         InputError
             If a name is not in the block or repeated, or a loss is specified.
-        BlockError
-            As in :meth:`adjust`, before its first iteration.
         """
 
 def give_back() -> None:
@@ -2019,6 +2000,9 @@ def plate_directions(
 class StellarProblem:
     """Calibration problem with prior values: S stars, G attitudes, m images.
 
+    Methods raise StellarError if stars or parameters are undetermined, or star images are undefined at the
+    initial values.
+
     Parameters
     ----------
     station, camera
@@ -2080,8 +2064,8 @@ class StellarProblem:
             Expected mean error of unit weight, the unit of `fraction` and of the history.
         fraction
             Convergence limit: largest change of an unknown as a fraction of its standard deviation.
-        max_iterations, covariance, threads, progress
-            As in `block_network`.
+        max_iterations, covariance
+            As in :func:`block_network`; `threads` and `progress` as in :class:`BlockNetwork`.
         whole
             Whether to compute the cofactors of all pairs of parameters, if there are cofactors.
 
@@ -2095,41 +2079,21 @@ class StellarProblem:
         `pointing_cofactors` (G, 3, 3), `cross_cofactors` (G, 3, 17) of attitudes and common parameters,
         `common_cofactors` (17, 17). With `whole`: `cofactors` (3 G + 17, 3 G + 17) and `log_determinant`, the
         natural logarithm of the determinant of the reduced normal equations.
-
-        Raises
-        ------
-        StellarError
-            If stars or parameters are undetermined, or star images are undefined at the initial values.
         """
 
     def without_effect(self) -> list[int]:
         """Return the indices of parameters that no image, weight or axis touches.
 
         Fixed parameters are excluded.
-
-        Raises
-        ------
-        StellarError
-            If a star has an undefined image at the initial values.
         """
 
     def correction(self, *, refraction: float, distortion: float, passes: int) -> dict[str, Any]:
-        """Correct the parameters once with the equations of `published` at the initial values.
-
-        Parameters
-        ----------
-        refraction, distortion, passes
-            As in `published`.
+        """Correct the parameters once with the equations and arguments of `published` at the initial values.
 
         Returns
         -------
         `parameters` (3 G + 17,): corrections; `cofactors` of all pairs and `log_determinant`, both for unit
         weight; `without_effect`: indices of the parameters that nothing touches, which are not corrected.
-
-        Raises
-        ------
-        StellarError
-            If stars or parameters are undetermined, or star images are undefined at the initial values.
         """
 
     def residual_cycle(
@@ -2149,11 +2113,6 @@ class StellarProblem:
         As in `adjust`, with plate coordinates instead of angles: `places`, `place_cofactors`,
         `place_inverses`, `residuals`, `axis_residual`, `sums_of_squares`, and `redundancy` and `standardized`
         of `image` and `place`.
-
-        Raises
-        ------
-        StellarError
-            If stars or their images are undetermined.
         """
 
     def equations(self) -> dict[str, _Floats]:
