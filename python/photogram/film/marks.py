@@ -77,11 +77,14 @@ def usual_places(camera_type: str) -> dict[str, tuple[tuple[float, float], float
     A prefix of the type is ignored.
     """
     plain = "".join(camera_type.lower().split())
+    known = next((own for name, own in _TYPES.items() if plain.endswith(name)), None)
+    if known is None:
+        return {}
+    corner, middle = known
     found = {}
-    for corner, middle in [own for name, own in _TYPES.items() if plain.endswith(name)][:1]:
-        for side, (x, y) in _SIGNS.items():
-            away, sd = middle if side.startswith("m") else corner
-            found[side] = (x * away, y * away), sd
+    for side, (x, y) in _SIGNS.items():
+        away, sd = middle if side.startswith("m") else corner
+        found[side] = (x * away, y * away), sd
     return found
 
 
