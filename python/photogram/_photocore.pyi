@@ -46,6 +46,9 @@ equations (k), number of photos, number of images."""
 ContributionRow = tuple[_Floats, _Floats, _Floats]
 """Contribution of a node to its parent: matrix, right-hand side, diagonal; see :class:`FormedNode`."""
 
+_Progress = Callable[[str, int, int, IterationRow | None], None] | None
+"""Progress of an adjustment, as in :class:`BlockNetwork`."""
+
 _DatumRow = tuple[str, list[int], list[int], bool, list[int], float | None]
 """Datum: its name, points, photos, use of scale, photos whose attitudes count, radius."""
 
@@ -96,54 +99,23 @@ def chi_square(x: float, dof: float, *, upper: bool = True) -> float:
 def chi_square_quantile(probability: float, dof: float, *, upper: bool = True) -> float:
     """Return the value that a chi-square variable exceeds (`upper`) with a probability.
 
-    Parameters
-    ----------
-    probability
-        Between 0 and 1; small values on either side retain their precision.
-    dof
-        Degrees of freedom, positive, not necessarily whole.
-    upper
-        Whether it is the probability of larger values.
-
-    Returns
-    -------
-    NaN for arguments outside these ranges.
+    It is the inverse of :func:`chi_square`; small probabilities on either side retain their precision.
     """
 
 def normal(z: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return (n,) the probabilities that a normal variable is less than each value."""
 
 def student(t: float, dof: float) -> float:
-    """Return the probability that the absolute value of Student's variable exceeds `t`.
-
-    Returns
-    -------
-    NaN for invalid arguments.
-    """
+    """Return the probability that the absolute value of Student's variable exceeds `t`; NaN if invalid."""
 
 def student_limit(probability: float, dof: float) -> float:
-    """Return the value that the absolute value of Student's variable exceeds with a probability.
-
-    Returns
-    -------
-    NaN for invalid arguments.
-    """
+    """Return the limit of the absolute value of Student's variable for a probability; NaN if invalid."""
 
 def fisher(x: float, first: float, second: float) -> float:
-    """Return the probability that an F variable of two degrees of freedom exceeds `x`.
-
-    Returns
-    -------
-    NaN for invalid arguments.
-    """
+    """Return the probability that an F variable of two degrees of freedom exceeds `x`; NaN if invalid."""
 
 def fisher_limit(probability: float, first: float, second: float) -> float:
-    """Return the value that an F variable of two degrees of freedom exceeds with a probability.
-
-    Returns
-    -------
-    NaN for invalid arguments.
-    """
+    """Return the limit of an F variable of two degrees of freedom for a probability; NaN if invalid."""
 
 def log_chi_square(x: _Floats, dof: _Floats) -> _Floats:
     """Return the logarithms of the probabilities that chi-square variables exceed values.
@@ -164,17 +136,7 @@ def log_chi_square(x: _Floats, dof: _Floats) -> _Floats:
 def log_fisher(x: _Floats, first: _Floats, second: _Floats) -> _Floats:
     """Return the logarithms of the probabilities that F variables exceed values.
 
-    Parameters
-    ----------
-    x
-        (n,) values, not negative.
-    first, second
-        (n,) degrees of freedom, positive.
-
-    Returns
-    -------
-    (n,) natural logarithms, also for probabilities below the smallest number; NaN for arguments outside these
-    ranges.
+    `first` and `second` are (n,) degrees of freedom; all else as in :func:`log_chi_square`.
     """
 
 def noncentral_chi_square(x: float, dof: float, noncentrality: float) -> float:
@@ -279,11 +241,6 @@ def camera_correct(model: str, parameters: _Floats, xy: _Floats) -> _Floats:
     Returns
     -------
     (n, 2) g, to compare with c (u1, u2) / u3.
-
-    Raises
-    ------
-    ValueError
-        If the model does not exist or is forward, or a shape or number of parameters is wrong.
     """
 
 def camera_partials(
@@ -305,12 +262,6 @@ def camera_patches(model: str, parameters: _Floats, u: _Floats) -> tuple[_Indice
     -------
     (n, s) numbers of knots, row by row, and (n, s) weights; s = 16 for order 3, 9 for order 2. The derivative
     of an image by a knot is diag(fx, fy) times its weight.
-
-    Raises
-    ------
-    ValueError
-        If the model does not support knots, constants of the spline are invalid, or a shape or number of
-        parameters is wrong.
     """
 
 def radial_domain(model: str, parameters: _Floats) -> tuple[float, float] | None:
@@ -376,17 +327,7 @@ def nadir_boresight(quarters: int) -> _Floats:
     """
 
 def rotation_matrix(angles: _Floats) -> _Floats:
-    """Compute rotation matrices M = M_kappa M_phi M_omega.
-
-    Parameters
-    ----------
-    angles
-        (n, 3) omega, phi, kappa in radians.
-
-    Returns
-    -------
-    (n, 3, 3) matrices.
-    """
+    """Compute rotation matrices (n, 3, 3) M_kappa M_phi M_omega of (n, 3) omega, phi, kappa in radians."""
 
 def rotation_angles(matrices: _Floats) -> _Floats:
     """Compute omega, phi, kappa of rotation matrices, the inverse of `rotation_matrix`.
@@ -403,20 +344,10 @@ def rotation_angles(matrices: _Floats) -> _Floats:
     """
 
 def vector_rotations(vectors: _Floats) -> _Floats:
-    """Convert (n, 3) rotation vectors to matrices: axis times angle, radians (Rodrigues).
-
-    Returns
-    -------
-    (n, 3, 3) matrices.
-    """
+    """Convert rotation vectors (n, 3), axis times angle in radians, to matrices (n, 3, 3) (Rodrigues)."""
 
 def rotation_vectors(matrices: _Floats) -> _Floats:
-    """Convert (n, 3, 3) rotation matrices to vectors, the inverse of `vector_rotations`.
-
-    Returns
-    -------
-    (n, 3) axis times angle, radians, no longer than pi.
-    """
+    """Convert rotation matrices (n, 3, 3) to vectors (n, 3), no longer than pi; see `vector_rotations`."""
 
 def geographic_to_geocentric(positions: _Floats, a: float, b: float) -> _Floats:
     """Convert geographic positions to geocentric X, Y, Z.
@@ -435,14 +366,7 @@ def geographic_to_geocentric(positions: _Floats, a: float, b: float) -> _Floats:
     """
 
 def geocentric_to_geographic(xyz: _Floats, a: float, b: float) -> _Floats:
-    """Convert geocentric X, Y, Z to geographic positions.
-
-    Parameters
-    ----------
-    xyz
-        (n, 3) in the linear unit of the axes.
-    a, b
-        Semi-major and semi-minor axis, 0 < b <= a.
+    """Convert geocentric X, Y, Z to geographic positions, the inverse of `geographic_to_geocentric`.
 
     Returns
     -------
@@ -489,22 +413,14 @@ def project(
     """
 
 def refraction_shift(
-    points: _Floats,
-    positions: _Floats,
-    *,
-    spheroid: tuple[float, float] | None,
-    refraction: RefractionRow,
+    points: _Floats, positions: _Floats, *, spheroid: tuple[float, float] | None, refraction: RefractionRow
 ) -> _Floats:
     """Compute the refraction displacement of points as seen by cameras, row by row.
 
     Parameters
     ----------
-    points, positions
-        (n, 3) points and projection centres: X, Y, Z, or longitude (rad), latitude (rad), height.
-    spheroid
-        Semi-axes (a, b) for geographic space, None for rectangular space.
-    refraction
-        Refraction model.
+    points, positions, spheroid, refraction
+        As in :func:`project`.
 
     Returns
     -------
@@ -552,7 +468,7 @@ def find_first_values(
         (m, 3) unit directions in the axes of the photos, not finite if undefined, and (m,) their standard
         deviations in radians.
     threads
-        As in `block_network`.
+        As in :class:`BlockNetwork`.
 
     Returns
     -------
@@ -685,10 +601,8 @@ def block_network(
         `bend`, the numbers are (e_1, e_2) of each point.
     records
         Number of photos at the end that are records of trajectories: without images, with the last camera.
-    spheroid
-        Semi-axes (a, b) for geographic space, None for rectangular space.
-    photo_to_ground
-        Direction of the angles.
+    spheroid, photo_to_ground
+        As in :func:`project`.
     refraction
         Refraction model, applied in every iteration; None for image coordinates without refraction.
     criterion, limit
@@ -728,7 +642,8 @@ class BlockNetwork:
         row). An exception that it raises stops the work. Signals are checked at the same time, so that Ctrl-C
         also stops it.
 
-    Methods raise BlockError for a block that cannot be adjusted or transformed to a datum.
+    Methods raise BlockError, before the first iteration if possible, for a block that cannot be adjusted or
+    transformed to a datum.
     """
 
     def adjust(
@@ -736,7 +651,7 @@ class BlockNetwork:
         *,
         datum: _DatumRow | None,
         threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+        progress: _Progress,
         start: BlockState | None = None,
         keep: Sequence[int] | None = None,
     ) -> BlockSolution:
@@ -749,22 +664,11 @@ class BlockNetwork:
         """
 
     def in_datum(
-        self,
-        state: BlockState,
-        datum: _DatumRow,
-        *,
-        threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+        self, state: BlockState, datum: _DatumRow, *, threads: int, progress: _Progress
     ) -> BlockSolution:
         """Transform an adjusted block to another datum, without iterations."""
 
-    def covariances(
-        self,
-        state: BlockState,
-        *,
-        threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None,
-    ) -> BlockCovariances:
+    def covariances(self, state: BlockState, *, threads: int, progress: _Progress) -> BlockCovariances:
         """Factor the normal equations at the adjusted state, in its datum."""
 
     def trial(self, state: BlockState | None, *, threads: int, kept: bool = False) -> NetworkTrial:
@@ -784,11 +688,6 @@ class BlockNetwork:
         """Return unknowns that an adjustment fixes to define the datum; empty if not needed.
 
         Photos, each with the index (0 to 5) of one of its unknowns.
-
-        Raises
-        ------
-        BlockError
-            As in :meth:`adjust`, before its first iteration.
         """
 
     def parts_in_datum(
@@ -833,8 +732,6 @@ class BlockNetwork:
 
         Raises
         ------
-        BlockError
-            As in :meth:`adjust` with a datum.
         BlockInputError
             If the names are not the names of all unknowns.
         """
@@ -878,8 +775,6 @@ class BlockNetwork:
         ------
         InputError
             If a name is not in the block or repeated, or a loss is specified.
-        BlockError
-            As in :meth:`adjust`, before its first iteration.
         """
 
 def give_back() -> None:
@@ -1034,23 +929,14 @@ class FormedNode:
     undetermined: Final[FailureRow | None]
     """Undetermined unknowns of the node, as in :class:`BlockError`; or None."""
 
-    def solve(
-        self,
-        outer: _Floats,
-        *,
-        threads: int,
-    ) -> _Floats:
+    def solve(self, outer: _Floats, *, threads: int) -> _Floats:
         """Return the step (N,) of all unknowns from the step of the outer ones (S,)."""
 
     has_chord: Final[bool]
     """Whether the right-hand side of a chord was reduced but not yet solved."""
 
     def reduce_chord(
-        self,
-        state: _Floats,
-        left: Sequence[_Floats],
-        *,
-        threads: int,
+        self, state: _Floats, left: Sequence[_Floats], *, threads: int
     ) -> tuple[_Floats, float] | None:
         """Reduce the right-hand side at a state: a second step with the same factor.
 
@@ -1068,12 +954,7 @@ class FormedNode:
         memory.
         """
 
-    def reduce(
-        self,
-        rights: _Floats,
-        *,
-        threads: int,
-    ) -> tuple[_Floats, _Floats]:
+    def reduce(self, rights: _Floats, *, threads: int) -> tuple[_Floats, _Floats]:
         """Reduce right-hand sides: y = L^-1 r of the unknowns eliminated here.
 
         Parameters
@@ -1089,12 +970,7 @@ class FormedNode:
             (d d,) y^T y; the sum over all nodes is r^T Q r.
         """
 
-    def complete(
-        self,
-        outer: _Floats,
-        *,
-        threads: int,
-    ) -> _Floats:
+    def complete(self, outer: _Floats, *, threads: int) -> _Floats:
         """Return solutions (d N,) of reduced rights, or the chord (N,), from the outer ones (d, S); once."""
 
     def invert(
@@ -1252,7 +1128,7 @@ class NetworkTrial:
         photos: list[int],
         *,
         tolerance: float | None,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+        progress: _Progress,
     ) -> tuple[str, int, float, int, list[int]]:
         """Adjust without removed observations, from the state of the last trial.
 
@@ -1423,17 +1299,12 @@ class BlockCovariances:
         columns: list[tuple[str, int]] | None,
         *,
         threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+        progress: _Progress,
     ) -> _Floats:
         """Return the cofactors of all unknowns of `rows`, or of `rows` with `columns`."""
 
     def propagate(
-        self,
-        partials: _Floats,
-        of: list[tuple[str, int]],
-        *,
-        threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+        self, partials: _Floats, of: list[tuple[str, int]], *, threads: int, progress: _Progress
     ) -> _Floats:
         """Return J Q J^T for (m, k) partial derivatives J of m functions of k unknowns."""
 
@@ -1456,7 +1327,7 @@ class BlockCovariances:
         vectors: int,
         seed: int,
         threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+        progress: _Progress,
     ) -> tuple[list[int], _Floats, list[bool]]:
         """Return sums of R_ij^2 over groups; R maps errors to residuals, both in standard deviations.
 
@@ -1485,13 +1356,7 @@ class BlockCovariances:
             (g,) whether columns were computed column by column; empty with classes.
         """
 
-    def project_images(
-        self,
-        columns: _Floats,
-        *,
-        threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None,
-    ) -> _Floats:
+    def project_images(self, columns: _Floats, *, threads: int, progress: _Progress) -> _Floats:
         """Return (k, m, 2) residuals from k columns of errors of all images, both in standard deviations.
 
         The result is R z for each column z; unused images have neither errors nor residuals.
@@ -1674,27 +1539,21 @@ def resect(
         is fixed.
     start
         (6,) initial values; None to compute them from triples of points.
-    spheroid
-        Semi-axes (a, b) for geographic space, None for rectangular space.
-    photo_to_ground
-        Direction of the angles.
+    spheroid, photo_to_ground
+        As in :func:`project`.
     at_measured
         Whether to form the partial derivatives at the measured image positions, as program W5344 does (USGS
         Computer Contribution 2, 1969, equations 4 and 5), instead of the computed ones.
     criterion, limit
         `fraction`: no unknown changes by more than `limit` of its standard deviation. `position`: the
         correction of the position is shorter than `limit`, full steps without damping (program W5344).
-    max_iterations
-        Maximum number of iterations from each initial pose.
-    covariance
-        Whether to compute cofactors and redundancy numbers; NaN otherwise.
+    max_iterations, covariance
+        As in :func:`block_network`; iterations are from each initial pose.
 
     Raises
     ------
     ResectionError
         If the photo cannot be resected.
-    ValueError
-        If a shape, length or choice is wrong; the message names the argument.
     """
 
 @final
@@ -1825,8 +1684,6 @@ def adjust_comparator(
     ------
     ComparatorError
         If the readings leave unknowns undetermined, or indices and lengths are inconsistent.
-    ValueError
-        If a shape is wrong; the message names the argument and its shape.
     """
 
 _Vector = tuple[float, float, float] | list[float]
@@ -1896,8 +1753,6 @@ def orient_model(
     ------
     SimilarityError
         If the model cannot be oriented.
-    ValueError
-        If a shape, length or choice is wrong; the message names the argument.
     """
 
 @final
@@ -2039,8 +1894,6 @@ def measured_feature(
     InputError
         If there are too few points, the feature is not uniquely determined, a value is not finite, or shapes
         are wrong.
-    ValueError
-        If the kind does not exist.
     """
 
 def nearest_points(points: _Floats, others: _Floats, limit: float, but: _Indices | None = None) -> _Indices:
@@ -2056,11 +1909,6 @@ def nearest_points(points: _Floats, others: _Floats, limit: float, but: _Indices
         Maximum distance, in the unit of the points.
     but
         (n,) one of the others to ignore for each point; -1 for none.
-
-    Raises
-    ------
-    InputError
-        If shapes are wrong.
     """
 
 def star_similarities(
@@ -2105,13 +1953,6 @@ def star_similarities(
     Number of pairs that agree, and (k, 4) similarities with the most votes, the best first. An image z, as a
     complex number, is mapped to (a + b i) z + (c + d i). All images vote on the 4,096 similarities selected
     by the makers.
-
-    Raises
-    ------
-    InputError
-        If shapes are wrong.
-    ValueError
-        If a candidate is not an image and a star.
     """
 
 def standard_coordinates(places: _Floats, sidereal_times: _Floats, place: _Station, tau: _Floats) -> _Floats:
@@ -2158,6 +1999,9 @@ def plate_directions(
 @final
 class StellarProblem:
     """Calibration problem with prior values: S stars, G attitudes, m images.
+
+    Methods raise StellarError if stars or parameters are undetermined, or star images are undefined at the
+    initial values.
 
     Parameters
     ----------
@@ -2209,7 +2053,7 @@ class StellarProblem:
         max_iterations: int,
         covariance: bool,
         threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None,
+        progress: _Progress,
         whole: bool = False,
     ) -> dict[str, Any]:
         """Adjust by least squares with exact partial derivatives.
@@ -2220,8 +2064,8 @@ class StellarProblem:
             Expected mean error of unit weight, the unit of `fraction` and of the history.
         fraction
             Convergence limit: largest change of an unknown as a fraction of its standard deviation.
-        max_iterations, covariance, threads, progress
-            As in `block_network`.
+        max_iterations, covariance
+            As in :func:`block_network`; `threads` and `progress` as in :class:`BlockNetwork`.
         whole
             Whether to compute the cofactors of all pairs of parameters, if there are cofactors.
 
@@ -2235,41 +2079,21 @@ class StellarProblem:
         `pointing_cofactors` (G, 3, 3), `cross_cofactors` (G, 3, 17) of attitudes and common parameters,
         `common_cofactors` (17, 17). With `whole`: `cofactors` (3 G + 17, 3 G + 17) and `log_determinant`, the
         natural logarithm of the determinant of the reduced normal equations.
-
-        Raises
-        ------
-        StellarError
-            If stars or parameters are undetermined, or star images are undefined at the initial values.
         """
 
     def without_effect(self) -> list[int]:
         """Return the indices of parameters that no image, weight or axis touches.
 
         Fixed parameters are excluded.
-
-        Raises
-        ------
-        StellarError
-            If a star has an undefined image at the initial values.
         """
 
     def correction(self, *, refraction: float, distortion: float, passes: int) -> dict[str, Any]:
-        """Correct the parameters once with the equations of `published` at the initial values.
-
-        Parameters
-        ----------
-        refraction, distortion, passes
-            As in `published`.
+        """Correct the parameters once with the equations and arguments of `published` at the initial values.
 
         Returns
         -------
         `parameters` (3 G + 17,): corrections; `cofactors` of all pairs and `log_determinant`, both for unit
         weight; `without_effect`: indices of the parameters that nothing touches, which are not corrected.
-
-        Raises
-        ------
-        StellarError
-            If stars or parameters are undetermined, or star images are undefined at the initial values.
         """
 
     def residual_cycle(
@@ -2289,11 +2113,6 @@ class StellarProblem:
         As in `adjust`, with plate coordinates instead of angles: `places`, `place_cofactors`,
         `place_inverses`, `residuals`, `axis_residual`, `sums_of_squares`, and `redundancy` and `standardized`
         of `image` and `place`.
-
-        Raises
-        ------
-        StellarError
-            If stars or their images are undetermined.
         """
 
     def equations(self) -> dict[str, _Floats]:
@@ -2424,14 +2243,10 @@ def control_points(
 
     Parameters
     ----------
-    data
-        Content of the file.
-    start, stop
-        Position of the points in the content.
+    data, start, stop, file
+        As in :func:`control_header`; the position is that of the points.
     lengths
         Lengths of the messages; None if each precedes its message.
-    file
-        File name, for errors.
 
     Returns
     -------
@@ -2540,16 +2355,8 @@ def collection_network(
         (m, 2) pixels.
     decrease
         Convergence limit: relative decrease of the weighted sum of squares by a step.
-    max_iterations
-        Maximum number of iterations.
-    covariance
-        Whether to compute cofactors and redundancy numbers; NaN otherwise.
-    loss
-        Robust loss of the image points, `huber` or `cauchy`, and its scale in a-priori standard deviations.
-    ordering
-        `auto`, `input`, `rcm`, `amd`, `dissection` or `graph-dissection`; see :func:`photogram.adjust`.
-    memory
-        Maximum bytes of the adjustment; None: unlimited.
+    max_iterations, covariance, loss, ordering, memory
+        As in :func:`block_network`.
     """
 
 @final
@@ -2561,21 +2368,11 @@ class CollectionNetwork:
     """
 
     def adjust(
-        self,
-        *,
-        threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None,
-        start: BlockState | None = None,
+        self, *, threads: int, progress: _Progress, start: BlockState | None = None
     ) -> CollectionSolution:
         """Adjust the collection, optionally from a former state with other weights."""
 
-    def covariances(
-        self,
-        state: BlockState,
-        *,
-        threads: int,
-        progress: Callable[[str, int, int, IterationRow | None], None] | None,
-    ) -> BlockCovariances:
+    def covariances(self, state: BlockState, *, threads: int, progress: _Progress) -> BlockCovariances:
         """Factor the normal equations at the adjusted state."""
 
     def trial(self, state: BlockState | None, *, threads: int) -> NetworkTrial:

@@ -1,6 +1,7 @@
 """Files of stations: CSV and cards; what is wrong is said with file, record and text."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from orientation_golden import cards_of, cases, csv_of, stations
 from orientation_models import simulate
@@ -76,6 +77,57 @@ def test_csv_columns(tmp_path):
     np.testing.assert_array_equal(read.model_sd, [[0.01, 0.02, 0.01], [0.01, 0.02, 0.03]])
     assert (read.ground_unit, read.model_unit) == ("ft", "um")
     np.testing.assert_array_equal(read.held, [[1, 1, 1], [0, 0, 0]])
+
+
+TABLE = pd.DataFrame(
+    [
+        ["A", 3.0, 2.0, 1.0, 4.0, 5.0, 6.0, 0.1, 0.01, 0.02, 0.01],
+        ["B", 6.0, 5.0, 4.0, np.nan, np.nan, 7.0, np.nan, 0.01, 0.02, 0.03],
+    ],
+    columns=["id", *"zyxXYZ", "sd_Z", "sd_x", "sd_y", "sd_z"],
+)
+
+
+def test_stations_of_a_data_frame():
+    read = Stations.from_table(TABLE, ground_unit="ft", model_unit="um")
+    assert read.ids == ("A", "B")
+    np.testing.assert_array_equal(read.control, [[4, 5, 6], [np.nan, np.nan, 7]])
+    np.testing.assert_array_equal(read.model, [[1, 2, 3], [4, 5, 6]])
+    np.testing.assert_array_equal(read.control_sd, [[0, 0, 0.1], [0, 0, 0]])
+    np.testing.assert_array_equal(read.model_sd, [[0.01, 0.02, 0.01], [0.01, 0.02, 0.03]])
+    assert (read.ground_unit, read.model_unit) == ("ft", "um")
+
+    plain = Stations.from_table(TABLE[["id", *"XYZxyz"]].assign(id=[7, 8]))
+    assert plain.ids == ("7", "8")
+    assert not plain.control_sd.any()
+    assert plain.model_sd is None
+    assert (plain.ground_unit, plain.model_unit) == ("ground unit", "model unit")
+
+
+def test_data_frames_and_csv_files_are_the_same(tmp_path):
+    from_csv = read_csv(write(tmp_path, TABLE.to_csv(index=False)))
+    from_table = Stations.from_table(TABLE)
+    assert from_csv.ids == from_table.ids
+    for name in ("control", "model", "control_sd", "model_sd"):
+        np.testing.assert_array_equal(getattr(from_csv, name), getattr(from_table, name))
+
+
+def test_errors_of_a_data_frame_name_column_and_station():
+    with pytest.raises(InputError) as missing:
+        Stations.from_table(TABLE.drop(columns=["Z", "y"]))
+    assert missing.value.code == "orientation.missing-columns"
+    assert missing.value.phrase.fields["names"] == ["Z", "y"]
+
+    for column, value, code in (
+        ("y", np.inf, "orientation.model-coordinate"),
+        ("Z", np.inf, "orientation.control-coordinate"),
+        ("sd_Z", -0.1, "orientation.control-sd"),
+        ("sd_y", np.inf, "orientation.model-sd"),
+    ):
+        with pytest.raises(InputError) as wrong:
+            Stations.from_table(TABLE.assign(**{column: [1.0, value]}))
+        assert wrong.value.code == code
+        assert wrong.value.phrase.fields == {"station": "B", "value": value}
 
 
 @pytest.mark.parametrize(

@@ -257,6 +257,14 @@ def test_tables_of_several_cameras_with_covariances(tmp_path):
         Certificate.read(tmp_path / "fiducials.csv", "a")
 
 
+@pytest.mark.parametrize("word", ["off", "No", "false", "0"])
+def test_marks_are_off_by_the_words_of_plain_projects(written, word):
+    own = written(f"camera,fiducial,x,y,use\na,ll,1,2,yes\na,ur,3,4,{word}\n", "fiducials.csv")
+    assert own.places == {"ll": (1.0, 2.0)}
+    (remark,) = own.told()
+    assert has_code(remark, "films.marks-off", marks=["ur"])
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
@@ -264,7 +272,7 @@ def test_tables_of_several_cameras_with_covariances(tmp_path):
         ("camera,fiducial,x,y\na,1,2,\n", coded("error.column", column="y", message="error.empty")),
         ("camera,fiducial,x,y\na,1,2,3\na,ll,2,3\n", coded("error.repeated")),
         ("camera,fiducial,x,y,sd_x,sd_y\na,1,2,3,0,1\n", coded("error.positive")),
-        ("camera,fiducial,x,y,use\na,1,2,3,maybe\n", coded("error.choice", names=["on", "off"])),
+        ("camera,fiducial,x,y,use\na,1,2,3,maybe\n", coded("error.flag", value="maybe")),
         ("camera,fiducial,x,y,colour\na,1,2,3,red\n", coded("error.unknown", kind="column", name="colour")),
     ],
 )

@@ -144,7 +144,8 @@ class Stations(Brief):
             raise InputError(phrase("orientation.no-model-sd"))
 
     def _refuse(self, values: Floats, faulty: Bools, code: str) -> None:
-        for row, column in np.argwhere(faulty).tolist():
+        if faulty.any():
+            row, column = np.argwhere(faulty)[0].tolist()
             fields = {"station": self.ids[row], "value": float(values[row, column])}
             raise InputError(phrase(f"orientation.{code}", **fields))
 

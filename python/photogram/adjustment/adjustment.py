@@ -25,7 +25,7 @@ from photogram.adjustment.remarks import (
 )
 from photogram.adjustment.robust import loss_row, remark
 from photogram.adjustment.undetermined import beyond_trajectory, in_one_place, undetermined_combinations
-from photogram.arguments.arrays import argument_error, whole_number
+from photogram.arguments.arrays import argument_error, by_key, whole_number
 from photogram.arguments.fields import options_of
 from photogram.arguments.objects import kind_error
 from photogram.errors import AdjustmentError, InputError, RankError, failure_of_core
@@ -224,12 +224,9 @@ def messages_of(
     messages += rounded(solution.redundancy_excess) + harmful(block, solution)
     messages += behind(block, solution) + folded(block, solution)
     dropped = dropped_points(block, solution)
-    by_reason: dict[str, list[str]] = {}
-    for point, reason in dropped.items():
-        by_reason.setdefault(reason, []).append(point)
     messages += [
         Message(phrase("adjust.left-out", reason=phrase(f"reason.{reason}"), points=", ".join(points)))
-        for reason, points in by_reason.items()
+        for reason, points in by_key((reason, point) for point, reason in dropped.items()).items()
     ]
     of_points = enumerate(block.observations.column("points") if dropped else [])
     lost = [block.observations[row].name for row, of in of_points if not dropped.keys().isdisjoint(of)]

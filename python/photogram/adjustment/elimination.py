@@ -41,13 +41,13 @@ class Elimination:
 
     def log(self) -> list[str]:
         """Return removed terms with reasons, then the remaining terms."""
-        codes = ["improbable" if not each.probability < self.level else "small" for each in self.removed]
-        rows = [*zip(codes, self.removed, strict=True), *(("kept", each) for each in self.kept)]
-        names = ("names", "camera", "probability", "effect")
-        fields = [{"level": self.level, **{name: getattr(each, name) for name in names}} for _, each in rows]
-        return [
-            str(phrase(f"elimination.{code}", **own)) for (code, _), own in zip(rows, fields, strict=True)
-        ]
+        tests = [("small" if test.probability < self.level else "improbable", test) for test in self.removed]
+        tests += [("kept", test) for test in self.kept]
+        lines = []
+        for code, test in tests:
+            values = {"probability": test.probability, "effect": test.effect, "level": self.level}
+            lines.append(phrase(f"elimination.{code}", names=test.names, camera=test.camera, **values))
+        return [str(line) for line in lines]
 
 
 def eliminate_terms(

@@ -6,7 +6,7 @@ steps.
 
 from __future__ import annotations
 
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from photogram import _photocore
 from photogram.adjustment.adjustment import adjust
 from photogram.adjustment.first_features import Known, with_poses
-from photogram.arguments.arrays import truth_value
+from photogram.arguments.arrays import by_key, truth_value
 from photogram.arguments.types import Bools, Floats
 from photogram.errors import AdjustmentError, InputError
 from photogram.lazy_dataclasses import dataclass, replace
@@ -149,46 +149,41 @@ def first_values(block: Block, *, keep_all: bool = False) -> FirstValues:
     axes = Cartesian(block.spheroid)
     known = Known.of(block, axes)
     directions, search = _searched(block, known, axes)
-    nominal = (
-        None if any(why[0] in SOURCES for why in search[2]) else _on_nominal(block, known, directions, axes)
-    )
+    nominal = None if search.oriented.any() else _on_nominal(block, known, directions, axes)
     search, orienting = (search, []) if nominal is None else nominal
-    positions, attitudes, how, points, aside, against, first, misfit = search
-    names = block.photo_ids
-    missing = {
-        photo: str(_reason(*why)) for photo, why in zip(names, how, strict=True) if why[0] not in SOURCES
-    }
-    sources = {photo: why[0] for photo, why in zip(names, how, strict=True) if why[0] in SOURCES}
+    reasons = dict(zip(block.photo_ids, search.reasons, strict=True))
+    missing = {photo: str(_reason(*why)) for photo, why in reasons.items() if why[0] not in SOURCES}
+    sources = {photo: why[0] for photo, why in reasons.items() if why[0] in SOURCES}
     kept = truth_value("keep_all", keep_all)
-    control = tuple(np.array(block.point_ids, dtype=object)[against])
-    mirrored = _mirrored(block, known, directions, len(sources), aside | against[block.image_points])
+    control = tuple(np.array(block.point_ids, dtype=object)[search.against])
+    wrong = search.aside | search.against[block.image_points]
+    mirrored = _mirrored(block, known, directions, len(sources), wrong)
     # A single image of a control point cannot be compared with others; the adjustment tests it.
-    posed = np.array([why[0] in SOURCES for why in how])[block.image_photos]
+    posed = search.oriented[block.image_photos]
     images = np.bincount(block.image_points[posed], minlength=len(block.point_ids))
-    aside = aside & ~((images == 1) & np.isfinite(block.point_sd).any(axis=1))[block.image_points]
+    aside = search.aside & ~((images == 1) & np.isfinite(block.point_sd).any(axis=1))[block.image_points]
     if not sources:
         hints = "".join(f"\n  hint: {hint}" for hint in mirrored)
         raise AdjustmentError(phrase("first.none", reasons=_reasons(missing), hints=hints))
-    if first is not None:
-        scale = _scale(block, points)
-        positions, points = positions * scale, points * scale
+    if search.first is not None:
+        scale = _scale(block, search.points)
+        search = search._replace(positions=search.positions * scale, points=search.points * scale)
+    first = None if search.first is None else block.photo_ids[search.first]
     return FirstValues(
-        block=_started(block, axes, positions, attitudes, how),
+        block=_started(block, axes, search),
         sources=sources,
         missing=missing,
-        contradicted=tuple(
-            photo for photo, why in zip(names, how, strict=True) if photo in missing and why[0] == "misfit"
-        ),
-        point_positions=axes.from_cartesian(points),
+        contradicted=tuple(photo for photo in missing if reasons[photo][0] == "misfit"),
+        point_positions=axes.from_cartesian(search.points),
         set_aside=np.zeros_like(aside) if kept else aside,
         contradicted_control=control,
-        misfit=np.nan if misfit is None else misfit,
-        first_photo=None if first is None else names[first],
+        misfit=np.nan if search.misfit is None else search.misfit,
+        first_photo=first,
         messages=[
             *mirrored,
             *orienting,
             *_of_control(block, control, aside),
-            *_messages(block, sources, missing, aside, None if first is None else names[first], kept=kept),
+            *_messages(block, sources, missing, aside, first, kept=kept),
         ],
     )
 
@@ -241,7 +236,26 @@ def _with(values: _Array, rows: Bools, others: _Array) -> _Array:
     return found
 
 
-def _searched(block: Block, known: Known, axes: Cartesian) -> tuple[Floats, _photocore.FoundRow]:
+class _Search(NamedTuple):
+    """Result of a search of the core for P photos, n points and m images; NaN if not found."""
+
+    positions: Floats  # (P, 3)
+    attitudes: Floats  # (P, 3, 3)
+    # (P,) one of `SOURCES`, or the reason why a photo is not oriented with two counts; see the core
+    reasons: list[tuple[str, int, int]]
+    points: Floats  # (n, 3)
+    aside: Bools  # (m,) images that are inconsistent with the poses
+    against: Bools  # (n,) control points whose images agree with each other but not with the coordinates
+    first: int | None  # Photo that defines the datum if nothing else does
+    misfit: float | None  # Median angle between observed and computed directions, radians
+
+    @property
+    def oriented(self) -> Bools:
+        """(P,) photos with a pose."""
+        return np.array([reason in SOURCES for reason, *_ in self.reasons], dtype=bool)
+
+
+def _searched(block: Block, known: Known, axes: Cartesian) -> tuple[Floats, _Search]:
     """Search with the given cameras, then with cameras estimated from the photos.
 
     Images and photos that fit estimated cameras only are accepted. If photos or control still do not fit,
@@ -249,9 +263,8 @@ def _searched(block: Block, known: Known, axes: Cartesian) -> tuple[Floats, _pho
     """
     given = image_directions(block)
     best = _improved(block, known, axes, given)
-    _, _, how, _, _, against, _, _ = best[1]
-    control = np.isfinite(block.point_sd).any(axis=1)
-    whole = all(why[0] in SOURCES for why in how) and against.sum() <= DOUBTFUL * control.sum()
+    search, control = best[1], np.isfinite(block.point_sd).any(axis=1)
+    whole = search.oriented.all() and search.against.sum() <= DOUBTFUL * control.sum()
     if whole or not control.any() or all(each.is_held for each in block.cameras):
         return best
     alone = block.replace(point_sd=np.inf)
@@ -259,9 +272,7 @@ def _searched(block: Block, known: Known, axes: Cartesian) -> tuple[Floats, _pho
     return max(best, _improved(block, known, axes, directions), key=lambda each: _fitting(each[1]))
 
 
-def _improved(
-    block: Block, known: Known, axes: Cartesian, directions: Floats
-) -> tuple[Floats, _photocore.FoundRow]:
+def _improved(block: Block, known: Known, axes: Cartesian, directions: Floats) -> tuple[Floats, _Search]:
     """Repeat the search with estimated cameras while more fits; return the best directions too."""
     best = directions, _found(block, known, directions)
     for _ in range(ESTIMATES):
@@ -280,25 +291,23 @@ def _improved(
     return best
 
 
-def _fitting(search: _photocore.FoundRow) -> tuple[int, int, int]:
+def _fitting(search: _Search) -> tuple[int, int, int]:
     """Return counts of oriented photos, and minus counts of inconsistent images and control."""
-    _, _, how, _, aside, against, _, _ = search
-    return sum(why[0] in SOURCES for why in how), -int(aside.sum()), -int(against.sum())
+    return int(search.oriented.sum()), -int(search.aside.sum()), -int(search.against.sum())
 
 
-def _calibrated(block: Block, axes: Cartesian, search: _photocore.FoundRow) -> Block | None:
+def _calibrated(block: Block, axes: Cartesian, search: _Search) -> Block | None:
     """Return the block with cameras adjusted with the poses of a search.
 
     None if all images fit, all cameras are fixed, or the adjustment fails.
     """
-    positions, attitudes, how, _, aside, against, _, _ = search
-    posed = np.array([why[0] in SOURCES for why in how])
+    posed, aside = search.oriented, search.aside
     free = not all(each.is_held for each in block.cameras)
-    if not free or not posed.any() or (posed.all() and not aside.any() and not against.any()):
+    if not free or not posed.any() or (posed.all() and not aside.any() and not search.against.any()):
         return None
-    start = _started(block, axes, positions, attitudes, how)
+    start = _started(block, axes, search)
     # Without inconsistent control and images, the datum or the cameras may be undetermined.
-    fewer = start.replace(point_sd=np.where(against[:, np.newaxis], np.inf, block.point_sd))
+    fewer = start.replace(point_sd=np.where(search.against[:, np.newaxis], np.inf, block.point_sd))
     for each, kept in ((fewer, ~aside), (start, ~aside), (start, np.ones_like(aside))):
         try:
             result = adjust(of_photos(kept_images(each, kept), posed), covariance=False)
@@ -309,8 +318,8 @@ def _calibrated(block: Block, axes: Cartesian, search: _photocore.FoundRow) -> B
     return None
 
 
-def _found(block: Block, known: Known, directions: Floats) -> _photocore.FoundRow:
-    return _photocore.find_first_values(
+def _found(block: Block, known: Known, directions: Floats) -> _Search:
+    row = _photocore.find_first_values(
         known.positions,
         known.attitudes,
         known.observed_positions,
@@ -323,11 +332,12 @@ def _found(block: Block, known: Known, directions: Floats) -> _photocore.FoundRo
         direction_deviations(block),
         threads=0,
     )
+    return _Search(*row)
 
 
 def _on_nominal(
     block: Block, known: Known, directions: Floats, axes: Cartesian
-) -> tuple[_photocore.FoundRow, list[Message]] | None:
+) -> tuple[_Search, list[Message]] | None:
     """Orient photos relatively and transform the model to nominal coordinates of points.
 
     None if no point has both constrained and free coordinates. None if the model contains fewer than three
@@ -341,18 +351,19 @@ def _on_nominal(
         points=np.full_like(known.points, np.nan),
         point_sd=np.full_like(known.point_sd, np.inf),
     )
-    positions, attitudes, how, points, aside, against, first, misfit = _found(block, free, directions)
+    search = _found(block, free, directions)
     given = axes.positions(block.point_positions)
-    rows = np.flatnonzero(np.isfinite(given).all(axis=1) & np.isfinite(points).all(axis=1))
-    if first is None or len(rows) < IN_COMMON:
+    rows = np.flatnonzero(np.isfinite(given).all(axis=1) & np.isfinite(search.points).all(axis=1))
+    if search.first is None or len(rows) < IN_COMMON:
         return None
-    scale, turn, shift, residual = similarity(points[rows], given[rows])
+    scale, turn, shift, residual = similarity(search.points[rows], given[rows])
     if not np.isfinite(residual):
         return None
     names = [block.point_ids[row] for row in rows.tolist()]
     message = Message(phrase("first.nominal", n=len(names), points=names))
-    carried = scale * positions @ turn.T + shift, turn @ attitudes, how, scale * points @ turn.T + shift
-    return (*carried, aside, against, None, misfit), [message]
+    positions, points = (scale * each @ turn.T + shift for each in (search.positions, search.points))
+    attitudes = turn @ search.attitudes
+    return search._replace(positions=positions, attitudes=attitudes, points=points, first=None), [message]
 
 
 def _mirrored(block: Block, known: Known, directions: Floats, started: int, against: Bools) -> list[Message]:
@@ -367,8 +378,8 @@ def _mirrored(block: Block, known: Known, directions: Floats, started: int, agai
     if np.count_nonzero(control) < NEEDED or not (doubtful or started < len(block.photo_ids)):
         return []
     found = _found(block, known, directions * [-1.0, 1.0, 1.0])
-    others = sum(why[0] in SOURCES for why in found[2])
-    still = int(np.count_nonzero((found[4] | found[5][block.image_points]) & of_control))
+    others = int(found.oriented.sum())
+    still = int(np.count_nonzero((found.aside | found.against[block.image_points]) & of_control))
     if others >= max(started, len(block.photo_ids) // 2) and (others > 2 * started or 5 * still < misses):
         return [Message(phrase("first.mirrored"))]
     count = int(np.count_nonzero(of_control))
@@ -387,16 +398,14 @@ def _of_control(block: Block, contradicted: tuple[str, ...], aside: Bools) -> li
     return messages
 
 
-def _started(
-    block: Block, axes: Cartesian, positions: Floats, attitudes: Floats, how: list[tuple[str, int, int]]
-) -> Block:
+def _started(block: Block, axes: Cartesian, search: _Search) -> Block:
     """Insert the computed poses; given poses and observed values do not change."""
-    found = np.array([why[0] in SOURCES and why[0] != "given" for why in how])
+    new = search.oriented & np.array([reason != "given" for reason, *_ in search.reasons])
     new_positions, new_attitudes = block.photo_positions.copy(), block.photo_attitudes.copy()
-    if found.any():
-        new_positions[found] = axes.from_cartesian(positions[found])
-        matrices = axes.to_local(attitudes[found], new_positions[found])
-        new_attitudes[found] = Attitudes(matrices).values(angles_form(block.photo_to_ground))
+    if new.any():
+        new_positions[new] = axes.from_cartesian(search.positions[new])
+        matrices = axes.to_local(search.attitudes[new], new_positions[new])
+        new_attitudes[new] = Attitudes(matrices).values(angles_form(block.photo_to_ground))
     return with_poses(block, new_positions, new_attitudes)
 
 
@@ -418,9 +427,7 @@ def _reason(kind: str, count: int, photos: int) -> Phrase:
 
 
 def _reasons(missing: dict[str, str]) -> str:
-    by_reason: dict[str, list[str]] = {}
-    for photo, reason in missing.items():
-        by_reason.setdefault(reason, []).append(photo)
+    by_reason = by_key((reason, photo) for photo, reason in missing.items())
     return "; ".join(f"{listed(photos)}: {reason}" for reason, photos in by_reason.items())
 
 

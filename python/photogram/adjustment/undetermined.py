@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from photogram.arguments.arrays import by_key
 from photogram.errors import RankError
 from photogram.lazy_dataclasses import dataclass
 from photogram.messages import listed
@@ -153,9 +154,7 @@ def _cause(block: Block, combination: _Combination, at: Setting, common: Sequenc
     if not moved:
         kinds = {common[row].KIND for row in others}
         return None if cameras else _of_unknowns(block, kinds, len(photos), at)
-    by_camera: dict[int, list[str]] = {}
-    for camera, k in moved:
-        by_camera.setdefault(camera, []).append(block.cameras[camera].names[k])
+    by_camera = by_key((camera, block.cameras[camera].names[k]) for camera, k in moved)
     parts = [
         phrase("moved.parameters", names=names, camera=block.camera_names[camera])
         for camera, names in by_camera.items()

@@ -30,6 +30,7 @@ _SYMMETRIC = 1e-9  # Largest asymmetry of a covariance matrix, relative to its d
 _ROUNDING = 1e-6  # Tolerance for correlations that were written with all digits and read again
 
 _Kind = TypeVar("_Kind")
+_Key = TypeVar("_Key")
 _Scalar = TypeVar("_Scalar", bound=np.generic)
 
 RULES: dict[str, Callable[[Any], Any]] = {
@@ -71,9 +72,10 @@ def shaped(
         else:
             raise argument_error(name, "shape", shape=str(shape).replace("None", "n"), actual=array.shape)
     if rule and not (good := RULES[rule](array)).all():
-        for first in np.argwhere(~(good | (missing & np.isnan(array)))).tolist():
-            where = f"{name}[{', '.join(map(str, first))}]" if first else name
-            raise _rule_error(where, rule, float(array[tuple(first)]))
+        wrong = np.argwhere(~(good | (missing & np.isnan(array)))).tolist()
+        if wrong:
+            where = f"{name}[{', '.join(map(str, wrong[0]))}]" if wrong[0] else name
+            raise _rule_error(where, rule, float(array[tuple(wrong[0])]))
     return frozen(array)
 
 
@@ -334,6 +336,14 @@ def by_occurrence(numbers: NDArray[np.int64]) -> NDArray[np.int64]:
     first = np.full(numbers.max(initial=-1) + 1, len(numbers))
     first[numbers[::-1]] = np.arange(len(numbers))[::-1]
     return np.argsort(first)[: np.count_nonzero(first < len(numbers))]
+
+
+def by_key(pairs: Iterable[tuple[_Key, _Kind]]) -> dict[_Key, list[_Kind]]:
+    """Return the values of each key, with the keys in the order of their first occurrence."""
+    groups: dict[_Key, list[_Kind]] = {}
+    for key, value in pairs:
+        groups.setdefault(key, []).append(value)
+    return groups
 
 
 def bounds(places: NDArray[np.float64]) -> NDArray[np.float64]:

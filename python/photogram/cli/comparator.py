@@ -62,7 +62,9 @@ def comparator(
         sessions = [replace(session, plot_each_case=True) for session in sessions]
     calibrations = [calibrate(session, options) for session in sessions]
     if strict:
-        for message in (message for one in calibrations for message in one.messages):
+        messages = [message for calibration in calibrations for message in calibration.messages]
+        if messages:
+            message = messages[0]
             text = message.phrase or str(message.text)
             raise InputError(text, file=message.file, record=message.record, text=message.record_text)
     job.reads(*(grid.source for one in sessions for grid in one.grids.values() if grid.source))

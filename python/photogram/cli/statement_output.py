@@ -58,8 +58,8 @@ class StatementOptions:
 
     def check_alone(self) -> None:
         """Reject these options for a command without a statement."""
-        for name in self.given:
-            raise misuse(f"--{name.replace('_', '-')}", "requires", options="--statement")
+        if names := list(self.given):
+            raise misuse(f"--{names[0].replace('_', '-')}", "requires", options="--statement")
 
     def asked(self, project: Project | None, reading: ReadOptions, unit: str) -> dict[str, Any]:
         """Return checked settings of a statement from options or project; lengths are in a unit."""

@@ -12,7 +12,7 @@ from photogram.adjustment.adjustment import Progress, core_options, core_threads
 from photogram.adjustment.options import AdjustOptions, Ordering
 from photogram.adjustment.remarks import hardly_determined, harmful_points, hidden, rounded
 from photogram.adjustment.robust import Loss, remark
-from photogram.arguments.arrays import truth_value
+from photogram.arguments.arrays import by_key, truth_value
 from photogram.collection.result import AdjustedCollection, collection_network, named
 from photogram.lazy_dataclasses import replace
 from photogram.messages import Message, Undetermined
@@ -134,12 +134,10 @@ def _messages(solution: _photocore.CollectionSolution, collection: Collection) -
         messages.append(Undetermined(phrase("collection.no-covariances", error=str(error)), what=str(error)))
     # A distant point on parallel rays converges slowly; it is reported separately.
     if solution.weak and not solution.weak_points:
-        photos: dict[int, list[str]] = {}
-        for photo, unknown in sorted(solution.weak, key=lambda pair: pair[1]):
-            photos.setdefault(unknown, []).append(str(photo))
+        weak = sorted(solution.weak, key=lambda pair: pair[1])
         unknowns = [
             str(phrase("collection.weak-unknowns", parameter=collection.parameters[unknown], names=names))
-            for unknown, names in photos.items()
+            for unknown, names in by_key((unknown, str(photo)) for photo, unknown in weak).items()
         ]
         messages.append(hardly_determined(solution.status, "; ".join(unknowns)))
     messages += rounded(solution.redundancy_excess)

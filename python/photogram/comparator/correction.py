@@ -387,7 +387,8 @@ def correct_table(
     """
     xy_um = table.xy_um
     sizes = np.abs(xy_um).max(axis=1, initial=0.0)
-    for row in np.flatnonzero(~(sizes <= LARGEST_UM))[:1].tolist():
+    if not (sizes <= LARGEST_UM).all():
+        row = int(np.argmin(sizes <= LARGEST_UM))
         code = "error.empty" if np.isnan(sizes[row]) else "error.most"
         with at_place(table.records.place(row), "x, y"):
             raise InputError(phrase(code, value=float(sizes[row]), high=LARGEST_UM))

@@ -67,8 +67,8 @@ class Table:
     def xy_um(self) -> Floats:
         """(rows, 2) coordinates in micrometres; NaN if both are blank."""
         xy = self.records.vectors((f"x_{self.unit}", f"y_{self.unit}")) * MICROMETRES[self.unit]
-        for row in np.flatnonzero(np.isnan(xy).sum(axis=1) == 1)[:1].tolist():
-            raise self.records.error(row, phrase("comparators.coordinate"))
+        if half_blank := np.flatnonzero(np.isnan(xy).sum(axis=1) == 1).tolist():
+            raise self.records.error(half_blank[0], phrase("comparators.coordinate"))
         return xy
 
     def measured(self) -> tuple[ColumnTable, Floats]:

@@ -404,8 +404,8 @@ def _readings(table: Table, only_plate: int) -> Iterator[Reading]:
     rows, xy_um = table.measured()
     defaults = {"plate": only_plate, "case": None, "operator": 0, "leg": 0, "point": None}
     columns = {name: rows.wholes(name, default) for name, default in defaults.items()}
-    for row in np.flatnonzero(columns["leg"] > MAX_LEG)[:1].tolist():
-        check_number(rows.place(row), "leg", int(columns["leg"][row]), 0, MAX_LEG)
+    if wrong := np.flatnonzero(columns["leg"] > MAX_LEG).tolist():
+        check_number(rows.place(wrong[0]), "leg", int(columns["leg"][wrong[0]]), 0, MAX_LEG)
     for row, (x, y) in enumerate(xy_um.tolist()):
         numbers = {name: int(column[row]) for name, column in columns.items()}
         yield Reading(xy_um=(x, y), place=rows.place(row), **numbers)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from photogram.arguments.arrays import by_key
 from photogram.arguments.types import Floats, Indices
 from photogram.comparator.grid import Grid
 from photogram.errors import InputError
@@ -294,9 +295,7 @@ def group_as_listed(points: Indices) -> Indices:
     order = list(range(len(points)))
     numbers = points.tolist()
     # Positions of the readings of each point; those before `start` were moved.
-    places: dict[int, list[int]] = {}
-    for place, number in enumerate(numbers):
-        places.setdefault(number, []).append(place)
+    places = by_key((number, place) for place, number in enumerate(numbers))
     start = 0
     while start < len(order):
         own, end = places[numbers[start]], start
@@ -468,10 +467,7 @@ def pool_points(
     `as_published` divides as in the listing. The divisor for a point is the number of its readings minus one.
     The divisor for all points is the number of readings minus the number of points.
     """
-    by_number: dict[int, list[PointReadings]] = {}
-    for case in cases:
-        for point in case:
-            by_number.setdefault(point.point, []).append(point)
+    by_number = by_key((point.point, point) for case in cases for point in case)
     each, all_means = (1, len(by_number)) if as_published else (None, None)
     by_point = {number: pool(own, means=each) for number, own in by_number.items()}
     return by_point, pool([point for own in by_number.values() for point in own], means=all_means)

@@ -18,7 +18,7 @@ b2 of these films. Along the axis at atan2(b2, b1)/2 a film is longer by 2 sqrt(
 
 from __future__ import annotations
 
-from collections import Counter, defaultdict
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import product
@@ -26,6 +26,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from photogram.arguments.arrays import by_key
 from photogram.arguments.types import Floats, Indices
 from photogram.diagnosis.mistakes import MOST, Adjuster, omega
 from photogram.diagnosis.tested_values import FOUND
@@ -210,9 +211,7 @@ def mark_hints(result: Result) -> list[Message]:
 
 def _photos(readings: list[_Tested], limit: float) -> list[str]:
     """Return the worst photos on which at least three marks, and more than half, fail."""
-    found = defaultdict[str, list[float]](list)
-    for each in readings:
-        found[each.photo].append(each.value)
+    found = by_key((each.photo, each.value) for each in readings)
     size = {photo: float(np.sqrt(np.mean(np.square(values)))) for photo, values in found.items()}
     return [
         photo

@@ -14,7 +14,7 @@ import numpy as np
 from photogram.arguments.arrays import one_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
-from photogram.film.certificate_file import REFERENCES, SD_PLACE, read_table, read_toml
+from photogram.film.certificate_file import REFERENCES, read_table, read_toml
 from photogram.film.distances import (
     AdjustedMarks,
     Crossing,
@@ -35,7 +35,7 @@ from photogram.film.lens_table import (
     fit_curve,
     forward,
 )
-from photogram.film.marks import usual_places
+from photogram.film.marks import SD_PLACE, usual_places
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import listed
 from photogram.network.cameras import Camera

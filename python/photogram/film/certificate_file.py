@@ -18,7 +18,7 @@ from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.film.distances import Crossing, MarkDistance, RightAngle
 from photogram.film.lens_table import SEMI_DIAGONALS, RadialTable, Tangential, of_semi_diagonals
-from photogram.film.marks import DataStrip, by_side, turned, turned_name
+from photogram.film.marks import SD_PLACE, DataStrip, by_side, marks_in_use, turned, turned_name
 from photogram.io.delimited import read_columns
 from photogram.io.places import at_place
 from photogram.io.toml import TomlTree, read_document
@@ -220,7 +220,6 @@ def _tangential(
     return Tangential(float(fit.parameters[0]), phi0, sign, math.sqrt(float(fit.cofactors[0, 0])))
 
 
-SD_PLACE = 0.002  # of a coordinate that is printed to 0.001 mm
 _NUMBERS = ("x", "y", "sd_x", "sd_y")
 _COLUMNS = ("camera", "fiducial", *_NUMBERS, "use")
 
@@ -242,29 +241,26 @@ def read_table(path: Path, camera: str | None) -> dict[str, Any]:
     name = cameras.names[0] if camera is None and cameras.names else camera
     if name is None or name not in cameras.names:
         raise InputError(unknown_name("camera", str(name), cameras.names), file=table.path)
-    rows = np.flatnonzero(cameras.rows == cameras.names.index(name)).tolist()
-    marks = [by_side(each) for each in table.texts("fiducial")]
-    use = table.words("use", ("on", "off"))
-    on = [row for row in rows if use[row] == "on"]
+    marks = [by_side(mark) for mark in table.texts("fiducial")]
+    in_use = marks_in_use(table.with_texts("fiducial", marks), [name])
+    on = {mark: row for (_, mark), row in in_use.items()}
     xy = table.given(("x", "y"))
     sd = table.vectors(("sd_x", "sd_y"), SD_PLACE)
-    names = [marks[row] for row in on]
-    for row in on:
-        if names.count(marks[row]) > 1:
-            raise table.error(row, phrase("error.repeated", kind="mark", name=marks[row]))
+    for row in on.values():
         if not (sd[row] > 0).all():
             message = phrase("error.positive", value=float(sd[row].min()))
             raise table.error(row, phrase("error.at", what="sd_x, sd_y", message=message))
-    fields = [f"{mark}.{axis}" for mark in names for axis in "xy"]
-    typed = {f"{marks[row]}.{axis}": table.texts(axis)[row] for row in on for axis in "xy"}
-    left = [marks[row] for row in rows if row not in on]
+    typed = {f"{mark}.{axis}": table.texts(axis)[row] for mark, row in on.items() for axis in "xy"}
+    rows = np.flatnonzero(cameras.rows == cameras.names.index(name)).tolist()
+    off = [marks[row] for row in rows if row not in on.values()]
+    deviations = sd[[*on.values()]].ravel()
     return {
         "name": name,
-        "places": {marks[row]: tuple(xy[row].tolist()) for row in on},
-        "covariance": _covariance(path.with_name("covariances.csv"), name, fields, sd[on].ravel()),
+        "places": {mark: tuple(xy[row].tolist()) for mark, row in on.items()},
+        "covariance": _covariance(path.with_name("covariances.csv"), name, [*typed], deviations),
         "typed": typed,
         "file": path,
-        "remarks": (phrase("films.marks-off", marks=left),) if left else (),
+        "remarks": (phrase("films.marks-off", marks=off),) if off else (),
     }
 
 

@@ -7,6 +7,7 @@ and both sides of the film are tested.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from itertools import product
 from typing import Literal
 
@@ -16,10 +17,12 @@ from numpy.typing import ArrayLike
 from photogram.arguments.arrays import frozen, number, shaped
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
+from photogram.io.column_table import ColumnTable
 from photogram.lazy_dataclasses import dataclass
 from photogram.words import phrase
 
 DataStrip = Literal["left", "top"]
+SD_PLACE = 0.002  # Default (mm) for positions in certificates, which are printed to 0.001
 
 SIDES = ("ll", "ur", "ul", "lr", "ml", "mr", "mt", "mb")
 """The marks in the order of their numbers in USGS certificates, 1 to 8."""
@@ -45,6 +48,19 @@ def turned(xy: Floats, data_strip: DataStrip) -> Floats:
     return np.stack([-xy[..., 1], xy[..., 0]], axis=-1) if data_strip == "top" else xy
 
 
+def marks_in_use(table: ColumnTable, cameras: Collection[str]) -> dict[tuple[str, str], int]:
+    """Return the rows of the marks of cameras by camera and mark, without marks with `use` off.
+
+    InputError: if a mark is repeated.
+    """
+    use, names = table.flags("use"), zip(table.texts("camera"), table.texts("fiducial"), strict=True)
+    rows: dict[tuple[str, str], int] = {}
+    for row, (camera, mark) in enumerate(names):
+        if use[row] and camera in cameras and rows.setdefault((camera, mark), row) != row:
+            raise table.error(row, phrase("error.repeated", kind=f"fiducial of {camera}", name=mark))
+    return rows
+
+
 _SIGNS = dict(zip(SIDES, [(-1, -1), (1, 1), (-1, 1), (1, -1), (-1, 0), (1, 0), (0, 1), (0, -1)], strict=True))
 """Directions of marks from the centre."""
 
@@ -61,11 +77,14 @@ def usual_places(camera_type: str) -> dict[str, tuple[tuple[float, float], float
     A prefix of the type is ignored.
     """
     plain = "".join(camera_type.lower().split())
+    known = next((own for name, own in _TYPES.items() if plain.endswith(name)), None)
+    if known is None:
+        return {}
+    corner, middle = known
     found = {}
-    for corner, middle in [own for name, own in _TYPES.items() if plain.endswith(name)][:1]:
-        for side, (x, y) in _SIGNS.items():
-            away, sd = middle if side.startswith("m") else corner
-            found[side] = (x * away, y * away), sd
+    for side, (x, y) in _SIGNS.items():
+        away, sd = middle if side.startswith("m") else corner
+        found[side] = (x * away, y * away), sd
     return found
 
 

@@ -309,8 +309,8 @@ class BlockBuilder:
                 )
         except InputError:
             for kind, names in (("photo", self.photo_ids), ("point", self.point_ids)):
-                for twice in (name for name, count in Counter(names).items() if count > 1):
-                    raise self.place.error(phrase("error.repeated", kind=kind, name=twice)) from None
+                if twice := [name for name, count in Counter(names).items() if count > 1]:
+                    raise self.place.error(phrase("error.repeated", kind=kind, name=twice[0])) from None
             raise
         return Project(
             block=block,

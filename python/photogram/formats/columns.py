@@ -211,7 +211,8 @@ def in_units(
         factor, parts = 1.0, list[Phrase]()
         known = KINDS_OF_UNITS.get(kind, {})
         words = [word for word in units_of(heading) if word in known or not _has_notes(column, own, word)]
-        for word in words[:1]:
+        if words:
+            word = words[0]
             if word not in known:
                 code = "columns.unit" if known else "columns.no-unit"
                 raise table.head.error(phrase(code, column=own, unit=word, names=list(known)))

@@ -83,10 +83,10 @@ def known_points(project: Project) -> KnownPoints:
 
 def check_images(block: Block, title: str) -> None:
     """Reject image coordinates of films or line scanners."""
-    for scan in (each for each in block.passages if isinstance(each, Scan)):
-        raise InputError(phrase("format.film", title=title, photo=scan.photo))
-    for strip in (each for each in block.timed if each.lines is not None):
-        raise InputError(phrase("format.scanner", photo=strip.photo))
+    if scans := [each for each in block.passages if isinstance(each, Scan)]:
+        raise InputError(phrase("format.film", title=title, photo=scans[0].photo))
+    if strips := [each for each in block.timed if each.lines is not None]:
+        raise InputError(phrase("format.scanner", photo=strips[0].photo))
 
 
 def intersected(project: Project, points: Indices) -> Floats:

@@ -95,8 +95,8 @@ def _sd(table: ColumnTable, options: ReadOptions) -> Floats | None:
     common = table.numbers("sd", default)
     found = table.vectors(("sd_column", "sd_row"))
     found = np.where(np.isnan(found), common[:, np.newaxis], found)
-    for row in np.flatnonzero(~(found > 0).all(axis=1))[:1].tolist():
-        positive(table.at(row), "the standard deviation", float(found[row].min()))
+    if wrong := np.flatnonzero(~(found > 0).all(axis=1)).tolist():
+        positive(table.at(wrong[0]), "the standard deviation", float(found[wrong[0]].min()))
     return found
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from photogram.arguments.arrays import by_key
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.columns import PLAIN, Columns
@@ -228,9 +229,8 @@ def _with_list(project: Project, given: ControlList) -> Project:
     A track with the identifier of a control point is another point and is renamed, unless both have an equal
     observation.
     """
-    exact, plain = set(project.block.photo_ids), dict[str, list[str]]()
-    for name in project.block.photo_ids:
-        plain.setdefault("_".join(name.split()), []).append(name)
+    exact = set(project.block.photo_ids)
+    plain = by_key(("_".join(name.split()), name) for name in project.block.photo_ids)
     listed = given.images.texts("photo")
     only = {name: names[0] for name, names in plain.items() if len(names) == 1}
     photos = [name if name in exact else only.get(name, "") for name in listed]

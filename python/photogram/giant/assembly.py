@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram.arguments.arrays import by_key
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.giant.common import Common
@@ -55,9 +56,7 @@ def _alike(block: Block) -> list[Message]:
         plain = [*map(plain_name, names)]
         if len(set(plain)) == len(names):
             continue
-        groups: dict[str, list[str]] = {}
-        for alike, name in zip(plain, names, strict=True):
-            groups.setdefault(alike, []).append(name)
+        groups = by_key(zip(plain, names, strict=True))
         pairs = [" and ".join(map(repr, group)) for group in groups.values() if len(group) > 1]
         if pairs:
             messages.append(Message.of(f"giant.similar-{what}", names=pairs))

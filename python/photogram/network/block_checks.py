@@ -377,8 +377,9 @@ def _check_timed(block: Block) -> None:
     if own:
         poses = np.hstack([block.photo_positions, block.photo_attitudes])
         unknown = np.isnan(poses).any(axis=1) & np.isin(block.photo_ids, own)
-        for row in np.flatnonzero(unknown).tolist():
-            raise InputError(phrase("block.moving-pose-unknown", photo=block.photo_ids[row]))
+        if unknown.any():
+            photo = block.photo_ids[int(np.argmax(unknown))]
+            raise InputError(phrase("block.moving-pose-unknown", photo=photo))
     block._set("_trajectories", [trajectory_of(block, each) for each in block.timed])
     on_frames = {name for mount in block.mounts for name in (mount.photo, mount.frame)}
     if both := [each.photo for each in block.timed if each.photo in on_frames]:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from photogram import _photocore
-from photogram.arguments.arrays import frozen
+from photogram.arguments.arrays import by_key, frozen
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass, replace
 from photogram.network.block import Block
@@ -45,9 +45,7 @@ def camera_images(block: Block) -> Floats:
 
 def _to_marks(block: Block, images: Floats) -> Floats:
     """Correct the images of each photo by an affine map fitted to its marks; (m, 2)."""
-    read: dict[str, list[Fiducial]] = {}
-    for each in block.observations.of_type(Fiducial):
-        read.setdefault(each.photo, []).append(each)
+    read = by_key((each.photo, each) for each in block.observations.of_type(Fiducial))
     for photo, own in read.items():
         film = own[0].film
         vectors = np.array([each.position for each in film.unknowns])

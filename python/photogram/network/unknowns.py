@@ -39,8 +39,8 @@ def are_rotations(matrices: Floats) -> Bools:
 def rotations(name: str, values: ArrayLike, *count: int) -> Floats:
     """Return rotation matrices (*count, 3, 3); InputError if one is mirrored or not orthonormal to 1e-6."""
     matrices = shaped(name, values, (*count, 3, 3))
-    for place in np.argwhere(~are_rotations(matrices)).tolist()[:1]:
-        raise kind_error(f"{name}{place or ''}", ROTATION, matrices[tuple(place)].tolist())
+    if wrong := np.argwhere(~are_rotations(matrices)).tolist():
+        raise kind_error(f"{name}{wrong[0] or ''}", ROTATION, matrices[tuple(wrong[0])].tolist())
     return matrices
 
 

@@ -107,8 +107,8 @@ class Grid(Brief):
         check_arrays(self, points=len(names("ids", self.ids)))
         readings = self.readings
         good = (readings >= 1) & (readings < 2**53) & (readings == np.trunc(readings))
-        for value in readings[~good].tolist():
-            raise InputError(phrase("projector.readings", value=value))
+        if not good.all():
+            raise InputError(phrase("projector.readings", value=readings[~good].tolist()[0]))
         object.__setattr__(self, "readings", readings.astype(np.int64))
         number("principal_distance", self.principal_distance, "positive")
 

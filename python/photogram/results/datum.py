@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from photogram import _photocore
+from photogram.arguments.arrays import by_key
 from photogram.arguments.objects import require_name
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import AdjustmentError, InputError, failure_of_core
@@ -96,9 +97,7 @@ def holds_scale(held: Sequence[tuple[str, str]]) -> bool:
 
 def held_unknowns(held: Sequence[tuple[str, str]]) -> list[Phrase]:
     """Return fixed unknowns with their photos, grouped by name."""
-    photos: dict[str, list[str]] = {}
-    for photo, unknown in held:
-        photos.setdefault(unknown, []).append(photo)
+    photos = by_key((unknown, photo) for photo, unknown in held)
     return [
         Phrase("datum.held", {"unknown": Phrase(f"axis.{unknown}"), "photos": own})
         for unknown, own in photos.items()

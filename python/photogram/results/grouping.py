@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from photogram.arguments.arrays import argument_error, by_occurrence, value_field
+from photogram.arguments.arrays import argument_error, by_key, by_occurrence, value_field
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.lazy_dataclasses import dataclass
@@ -237,10 +237,7 @@ def observables(network: object) -> Observables:
 def _strips(block: Block) -> list[Indices]:
     """Return the photos of each strip: by trajectory, or by position."""
     own = {each.photo: each.trajectory for each in block.timed if each.trajectory is not None}
-    flown: dict[int, list[int]] = {}
-    for row, name in enumerate(block.photo_ids):
-        if name in own:
-            flown.setdefault(id(own[name]), []).append(row)
+    flown = by_key((id(own[name]), row) for row, name in enumerate(block.photo_ids) if name in own)
     others = np.flatnonzero(~on_shared(block))
     found = strips_of(local_axes(block).positions(block.photo_positions)[others]) if len(others) else []
     return [*(others[strip] for strip in found), *(np.array(rows, dtype=np.int64) for rows in flown.values())]

@@ -394,12 +394,11 @@ class Hypotheses:
     @property
     def common_is_harmful(self) -> bool:
         """Whether the most likely of these errors moves a point beyond the limit."""
-        for row in self.common()[:1]:
-            estimate = self.sets[row]["estimate"]
-            if row in self.effects:
-                share = float(np.linalg.norm(estimate) / np.linalg.norm(self.errors[row]))
-                return share * self.effects[row].ratio > self.limit
-        return False
+        row = next(iter(self.common()), None)
+        if row is None or row not in self.effects:
+            return False
+        share = float(np.linalg.norm(self.sets[row]["estimate"]) / np.linalg.norm(self.errors[row]))
+        return share * self.effects[row].ratio > self.limit
 
     @property
     def likely(self) -> Indices:

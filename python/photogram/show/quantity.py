@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from photogram.arguments.arrays import by_key
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.io.csv_text import csv_text
 from photogram.io.numbers import ARCSEC
@@ -232,9 +233,7 @@ def frame(table: Quantities) -> dict[str, Any]:
 
 def unit_comments(table: Quantities) -> list[str]:
     """Return one line per unit of the columns of `frame`, if not in the name."""
-    names: dict[str, list[str]] = {}
-    for name, unit, _ in _columns(table):
-        names.setdefault(unit, []).append(name)
+    names = by_key((unit, name) for name, unit, _ in _columns(table))
     return [f"unit of {', '.join(own)}: {unit}" for unit, own in names.items() if unit]
 
 

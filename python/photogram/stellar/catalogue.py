@@ -109,9 +109,9 @@ class Catalogue:
             given.given((name,)) if name in given else np.zeros((len(ids), 1)) for name in _COLUMNS[1:]
         ]
         table = np.hstack(numbers)
-        for row in np.flatnonzero(~(np.abs(table[:, 1]) <= 90))[:1].tolist():
-            limits = {"low": -90, "high": 90, "value": float(table[row, 1])}
-            raise given.cell_error(row, "dec_deg", "error.range", **limits)
+        if wrong := np.flatnonzero(~(np.abs(table[:, 1]) <= 90)).tolist():
+            limits = {"low": -90, "high": 90, "value": float(table[wrong[0], 1])}
+            raise given.cell_error(wrong[0], "dec_deg", "error.range", **limits)
         return cls(
             ids,
             np.radians(table[:, :2]),

@@ -224,7 +224,8 @@ class _Exposures:
                 raise images.error(row, unknown_name("exposure", name, self.names))
         self.xy = images.given(("x_px", "y_px")) + _FIRST_PIXELS["x_px"] - _FIRST_PIXELS[heading]
         outside = ~((self.xy >= np.negative(frame)) & (self.xy <= 2 * np.array(frame))).all(axis=1)
-        for row in np.flatnonzero(outside)[:1].tolist():
+        if outside.any():
+            row = int(np.argmax(outside))
             x, y = self.xy[row].tolist()
             raise images.error(row, phrase("stars.outside", x=x, y=y, width=frame[0], height=frame[1]))
         self.stars = images.texts("star")

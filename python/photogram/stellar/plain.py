@@ -246,9 +246,9 @@ def _stars(table: TomlTree, rows: ColumnTable, station: Site) -> tuple[Floats, F
         with at_place(rows.place(row)):
             places[row], weights[row] = landmark(station, azimuth, elevation, weights[row])
     rows.check_given(places, ("ra_rad", "dec_rad"))
-    for row in np.flatnonzero(~landmarks & (np.abs(places[:, 1]) > math.pi / 2))[:1].tolist():
-        fields = {"star": rows.texts("star")[row], "value": float(places[row, 1])}
-        raise rows.error(row, phrase("stars.declination", **fields))
+    if wrong := np.flatnonzero(~landmarks & (np.abs(places[:, 1]) > math.pi / 2)).tolist():
+        fields = {"star": rows.texts("star")[wrong[0]], "value": float(places[wrong[0], 1])}
+        raise rows.error(wrong[0], phrase("stars.declination", **fields))
     return places, weights, landmarks
 
 

@@ -112,8 +112,8 @@ class Board(Valued, Brief):
             raise InputError(phrase("targets.bend"))
         points = shaped("points", self.points, (None, 3))
         self._set("points", points)
-        for value in points[~(np.abs(points) <= MAX_LENGTH)].tolist()[:1]:
-            raise argument_error("points", "range", low=-MAX_LENGTH, high=MAX_LENGTH, value=value)
+        if wrong := points[~(np.abs(points) <= MAX_LENGTH)].tolist():
+            raise argument_error("points", "range", low=-MAX_LENGTH, high=MAX_LENGTH, value=wrong[0])
         if self.point_names is not None:
             point_names = names("point_names", self.point_names)
             if not len(point_names) == len(set(point_names)) == len(points):

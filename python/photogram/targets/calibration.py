@@ -139,8 +139,8 @@ class Calibration(Valued, Brief):
         self._leave_out(np.asarray(self.poses))
         for name in ("sd_sensors", "sd_bend"):
             values = np.asarray(getattr(self, name))
-            for value in values[~(values > 0)].tolist():
-                raise InputError(phrase("targets.free-sd", name=name, value=value))
+            if wrong := values[~(values > 0)].tolist():
+                raise InputError(phrase("targets.free-sd", name=name, value=wrong[0]))
         if self.sync == "offset":
             self._set_motion()
 

@@ -161,8 +161,8 @@ def _of_table(table: ColumnTable, board: Board | None) -> Measured:
     views = None
     if "view" in table:
         of_rows = np.array(table.texts("view"), dtype=object)
-        for row in np.flatnonzero(of_rows != of_rows[first][image]).tolist()[:1]:
-            raise table.cell_error(row, "view", "targets.other-view")
+        if wrong := np.flatnonzero(of_rows != of_rows[first][image]).tolist():
+            raise table.cell_error(wrong[0], "view", "targets.other-view")
         views = of_rows[first].tolist()
     return Measured(
         path=table.path,
@@ -185,8 +185,8 @@ def _points(table: ColumnTable, board: Board | None) -> Indices:
         numbers = (int(cell) if cell.isdecimal() else -1 for cell in cells)
         known = numbers if names is None else (names.get(cell, -1) for cell in cells)
         found = np.fromiter(known, np.int64, len(cells))
-        for row in np.flatnonzero(found < 0).tolist()[:1]:
-            raise table.cell_error(row, "point", "targets.no-point", point=cells[row])
+        if wrong := np.flatnonzero(found < 0).tolist():
+            raise table.cell_error(wrong[0], "point", "targets.no-point", point=cells[wrong[0]])
         return found
     if board is None:
         raise table.head.error(phrase("targets.needs-board"))

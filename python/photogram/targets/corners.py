@@ -111,10 +111,10 @@ class Corners(Valued, Brief):
             ("deviation", np.flatnonzero(~((self.sd > 0) & np.isfinite(self.sd)))),
             ("repeated-corner", repeated_pairs(self.picture, self.point, 2**31)),
         ):
-            for row in rows.tolist()[:1]:
-                raise InputError(phrase(f"targets.{code}", corner=self.title(row)))
-        for row in repeated_pairs(self.views, self.cameras, len(self.camera_names)).tolist():
-            fields = {"picture": self.pictures[row], "camera": self.camera_names[self.cameras[row]]}
+            if rows.size:
+                raise InputError(phrase(f"targets.{code}", corner=self.title(int(rows[0]))))
+        if rows := repeated_pairs(self.views, self.cameras, len(self.camera_names)).tolist():
+            fields = {"picture": self.pictures[rows[0]], "camera": self.camera_names[self.cameras[rows[0]]]}
             raise InputError(phrase("targets.second-picture", **fields))
 
     def title(self, row: int) -> str:

@@ -62,8 +62,9 @@ def _add_points(
     report("isis.no-covariance", rows[own[~given]])
     own, covariances = own[given], covariances[given]
     bad = ~(np.linalg.eigvalsh(covariances) > 0).all(axis=1)
-    for row in rows[own[bad]][:1].tolist():
-        raise block.place.error(phrase("isis.covariance", point=points.ids[row]))
+    if bad.any():
+        point = points.ids[rows[own[bad]][0]]
+        raise block.place.error(phrase("isis.covariance", point=point))
     if spheroid:
         axes = local_frames(coordinates[own])
         covariances = axes @ covariances @ axes.transpose(0, 2, 1)
@@ -116,8 +117,8 @@ def _images(network: ControlNetwork, files: dict[str, Path], settings: Settings,
     """Return the images that have measures, in the order of the network."""
     rows = np.unique(network.measures.serial[~network.is_ignored]).tolist()
     seen = [network.measures.serials[row] for row in rows]
-    for serial in (each for each in seen if each not in files):
-        raise InputError(phrase("isis.image", name=serial), file=cubes)
+    if missing := [serial for serial in seen if serial not in files]:
+        raise InputError(phrase("isis.image", name=missing[0]), file=cubes)
     held, there, found = set[str](), set(seen), {}
     named = {str(file.resolve()): serial for serial, file in files.items()} if settings.held else {}
     # HELDLIST is a list of serial numbers or files.
@@ -159,8 +160,9 @@ def _seen(network: ControlNetwork, images: list[Image], path: Path) -> _Seen:
     if not len(rows):
         raise InputError(phrase("format.missing", what="measures that are not ignored"), file=path)
     bad = rows[~(np.isfinite(own.sample[rows]) & np.isfinite(own.line[rows]))]
-    for point in network.point_of_measure[bad[:1]].tolist():
-        raise InputError(phrase("isis.measure", point=network.points.ids[point]), file=path)
+    if bad.size:
+        point = network.points.ids[network.point_of_measure[bad[0]]]
+        raise InputError(phrase("isis.measure", point=point), file=path)
     points, image_points = np.unique(network.point_of_measure[rows], return_inverse=True)
     photos, xy, sd = np.zeros(len(rows), np.int64), np.zeros((len(rows), 2)), np.zeros(len(rows))
     of_serial = dict(zip(own.serials, rows_of_each(own.serial[rows], len(own.serials)), strict=True))

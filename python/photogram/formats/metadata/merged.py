@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path, PurePosixPath
 
-from photogram.arguments.arrays import natural_order, truth_value
+from photogram.arguments.arrays import by_key, natural_order, truth_value
 from photogram.errors import InputError
 from photogram.formats.cards import filled_lines
 from photogram.formats.control import SYSTEMS
@@ -136,9 +136,8 @@ def _add_exposures(files: Mapping[str, Path], found: _Sources, *, antenna: bool)
     """Add exposures of .MRK files to the photos of their folders, or of subfolders without such files."""
     exposures = {path: read_exposures(path, antenna=antenna) for path in files.values()}
     found.tables += exposures
-    of_folder, used = dict[str, list[Path]](), {path: set[int]() for path in exposures}
-    for key, path in files.items():
-        of_folder.setdefault(PurePosixPath(key).parent.as_posix(), []).append(path)
+    used = {path: set[int]() for path in exposures}
+    of_folder = by_key((PurePosixPath(key).parent.as_posix(), path) for key, path in files.items())
     for key, sources in found.said.items():
         photo = PurePosixPath(key)
         number = number_of(photo.stem)
@@ -230,9 +229,7 @@ class Metadata(Documented):
         """Return the document: files, sources of positions and standard deviations, flights."""
         records = list(self.photos.values())
         located = [each for each in records if each.position is not None]
-        flights: dict[str, list[PhotoRecord]] = {}
-        for each in located:
-            flights.setdefault(each.flight, []).append(each)
+        flights = by_key((each.flight, each) for each in located)
         files = [
             Fact("Folder", str(self.directory)),
             Fact.of("Pictures", len(self.pictures)),
@@ -323,9 +320,8 @@ def remarks_on(records: Iterable[PhotoRecord]) -> list[Message]:
     remarks: dict[str, int] = {}
     for each in records:
         sources = [source for source in (each.deviations, each.position) if source is not None]
-        for source in sources[:1]:
-            if source.remark:
-                remarks[source.remark] = remarks.get(source.remark, 0) + 1
+        if sources and (remark := sources[0].remark):
+            remarks[remark] = remarks.get(remark, 0) + 1
         fix = next((source.fix for source in sources if source.fix), FIXED)
         if fix != FIXED:
             fixes.setdefault(fix, []).append(each.photo)

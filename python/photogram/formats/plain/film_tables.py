@@ -14,6 +14,7 @@ from photogram.arguments.arrays import is_covariance
 from photogram.arguments.types import Floats
 from photogram.errors import ContradictionError, InputError, message_of
 from photogram.film.distances import with_datum
+from photogram.film.marks import SD_PLACE, marks_in_use
 from photogram.formats.plain.schema import CURVES, DEVICE, GRID, TABLES, deviation_columns
 from photogram.formats.plain.tables import Tables, columns_of, made
 from photogram.formats.plain.unknowns import Covariances
@@ -280,7 +281,6 @@ def film_cells(film: Film, known: KnownFilm | None) -> dict[str, Any]:
 
 
 _MODELS = ("brown_forward", "brown")
-SD_MARK = 0.002  # Default (mm) for positions in a certificate, which are printed to 0.001
 
 
 def read_certificates(tables: Tables) -> dict[str, Certificate]:
@@ -431,14 +431,9 @@ def read_fiducials(
 ) -> dict[str, Marks]:
     found, table = dict[str, Marks](), tables.rows("fiducials")
     xy = table.given(("x", "y"))
-    sd = tables.deviations(table, "fiducials", ("sd_x", "sd_y"), SD_MARK)
-    use, texts = table.flags("use"), [table.texts(name) for name in ("camera", "fiducial")]
-    for row, (camera, name) in enumerate(zip(*texts, strict=True)):
-        if not use[row] or camera not in cameras:
-            continue
+    sd = tables.deviations(table, "fiducials", ("sd_x", "sd_y"), SD_PLACE)
+    for (camera, name), row in marks_in_use(table, cameras).items():
         own = found.setdefault(camera, Marks(camera))
-        if name in own.marks:
-            raise table.error(row, phrase("error.repeated", kind=f"fiducial of {camera}", name=name))
         own.add(name, xy[row])
         own.sd[name] = sd[row]
     for camera, certificate in certificates.items():

@@ -63,7 +63,8 @@ def read_photos(tables: Tables, transform: Transform, cameras: Cameras) -> Photo
     flown = np.array([bool(each) for each in table.texts("trajectory")], dtype=bool)
     sd = tables.deviations(table, "photos", SD_AXES, math.inf)
     sd[flown] = table.vectors(SD_AXES, math.inf, infinite=True)[flown]
-    for row, axis in np.argwhere(np.isfinite(sd) & np.isnan(centres))[:1].tolist():
+    if wrong := np.argwhere(np.isfinite(sd) & np.isnan(centres)).tolist():
+        row, axis = wrong[0]
         raise table.cell_error(row, SD_AXES[axis], "plain.sd-alone", value=AXES[axis])
     if "photos" in tables.settings.crs and np.isfinite(sd).any():
         raise table.head.error(phrase("plain.sd-with-crs"))
@@ -95,8 +96,8 @@ def cameras_of(table: ColumnTable, names: Sequence[str]) -> list[int]:
     if "camera" not in table and not only:
         raise table.head.error(phrase("plain.which-camera", count=len(names)))
     texts, places = table.texts("camera", only), {name: row for row, name in enumerate(names)}
-    for row in (row for row, name in enumerate(texts) if name not in places):
-        raise table.unknown_error(row, "camera", "camera", texts[row], places)
+    if wrong := [row for row, name in enumerate(texts) if name not in places]:
+        raise table.unknown_error(wrong[0], "camera", "camera", texts[wrong[0]], places)
     return [places[name] for name in texts]
 
 
@@ -128,8 +129,8 @@ def _attitude_weights(
     if not any(each in table for each in columns):
         return free, {}
     sd = tables.angles(table, columns, math.inf, infinite=True)
-    for row in np.argwhere(sd < 0)[:1, 0].tolist():
-        raise table.error(row, phrase("plain.negative-angle-sd", value=float(sd[row].min())))
+    if wrong := np.flatnonzero((sd < 0).any(axis=1)).tolist():
+        raise table.error(wrong[0], phrase("plain.negative-angle-sd", value=float(sd[wrong[0]].min())))
     unknown = np.isfinite(sd).any(axis=1) & np.isnan(matrices).any(axis=(1, 2))
     check_rows(table, unknown, phrase("plain.no-angles"))
     plain = settings.attitude == "omega_phi_kappa" and settings.photo == "y_up"
@@ -214,8 +215,8 @@ def _image_sd(tables: Tables, table: ColumnTable, *, given: bool) -> Floats | No
         return None
     if "level" in table and not own and "sd" not in table:
         found = found * 2.0 ** table.numbers("level", 0.0)[:, np.newaxis]
-    for row in np.argwhere(~((found > 0) & np.isfinite(found)))[:1, 0].tolist():
-        raise table.error(row, phrase("plain.image-sd", value=found[row].tolist()))
+    if wrong := np.flatnonzero(~((found > 0) & np.isfinite(found)).all(axis=1)).tolist():
+        raise table.error(wrong[0], phrase("plain.image-sd", value=found[wrong[0]].tolist()))
     return found
 
 

@@ -179,7 +179,8 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     is_control = np.array([each == "control" for each in uses], dtype=bool)
     without_sd = is_control & (np.isnan(sd) & ~np.isnan(values)).any(axis=1)
     for code, wrong in (("no-coordinates", np.isnan(values).all(axis=1)), ("control-sd", without_sd)):
-        for row in np.flatnonzero(wrong)[:1].tolist():
+        if wrong.any():
+            row = int(np.argmax(wrong))
             raise table.error(row, phrase(f"plain.{code}", point=names[row]))
     sd = np.where(np.isnan(sd) | np.isnan(values), np.inf, sd)
     covariances = covariances_of(np.where(np.isinf(sd), 0.0, sd), table)

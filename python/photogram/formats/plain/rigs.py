@@ -266,8 +266,8 @@ def read_timed(
             "plain.line-rate": "rate" in given and not scanned,
             "plain.moving-attitude": not flown and np.isfinite(sd).any() and sd.any(),
         }
-        for code in (code for code, wrong in contradictions.items() if wrong):
-            raise table.error(row, phrase(code))
+        if codes := [code for code, is_wrong in contradictions.items() if is_wrong]:
+            raise table.error(row, phrase(codes[0]))
         found.append(made(table, row, Timed, name, **given))
     return found
 

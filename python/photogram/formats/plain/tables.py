@@ -216,8 +216,8 @@ class Tables:
         if required:
             table.check_given(values, [name])
         code, valid = _NUMBERS.get(column.kind, ("", np.isreal))
-        for row in np.flatnonzero(~(valid(values[:, 0]) | np.isnan(values[:, 0])))[:1].tolist():
-            raise table.cell_error(row, name, code, value=float(values[row, 0]))
+        if wrong := np.flatnonzero(~(valid(values[:, 0]) | np.isnan(values[:, 0]))).tolist():
+            raise table.cell_error(wrong[0], name, code, value=float(values[wrong[0], 0]))
         convert = int if column.kind == "whole" else float
         return [math.nan if math.isnan(each) else convert(each) for each in values[:, 0].tolist()]
 
@@ -311,7 +311,8 @@ class Tables:
             if common is not None:
                 own = np.where(np.isnan(own), common, own)
             found[:, k] = np.where(np.isnan(own), defaults[k], own)
-        for row, k in np.argwhere(found < 0)[:1].tolist():
+        if (found < 0).any():
+            row, k = np.argwhere(found < 0)[0].tolist()
             raise table.cell_error(row, columns[k], "error.not-negative", value=float(found[row, k]))
         return found
 

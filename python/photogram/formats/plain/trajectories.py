@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from photogram.arguments.arrays import by_key
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.plain.schema import AXES, BASES, FACTORS, OPK, SD_AXES, TABLES, VELOCITY
@@ -78,10 +79,8 @@ def read_trajectories(tables: Tables) -> dict[str, Trajectory]:
 def rows_of(tables: Tables, name: str, *, bases: bool = False) -> Groups:
     """Return the rows of each photo or trajectory or, if `bases`, of each correction of trajectories."""
     words = [tables.column(name, column) for column in (TABLES[name].columns[0], *(["of"] if bases else []))]
-    found: dict[tuple[str, ...], list[int]] = {}
-    for row, key in enumerate(zip(*words, strict=True)):
-        found.setdefault(key, []).append(row)
-    return {key: np.array(rows, dtype=np.int64) for key, rows in found.items()}
+    rows_by_key = by_key((key, row) for row, key in enumerate(zip(*words, strict=True)))
+    return {key: np.array(rows, dtype=np.int64) for key, rows in rows_by_key.items()}
 
 
 def increasing(table: ColumnTable, groups: Groups, column: str = "time", *, multiple: bool = False) -> Floats:

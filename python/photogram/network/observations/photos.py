@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from photogram.arguments.arrays import by_key
 from photogram.arguments.types import Floats
 from photogram.lazy_dataclasses import dataclass
 from photogram.network.observations.columns import Observations
@@ -79,10 +80,7 @@ class Position(Observation):
 
 def _epochs(drifts: Iterable[tuple[Unknown | None, float]]) -> dict[Unknown | None, float]:
     """Return the epoch of each drift: given, or the mean of its observation times."""
-    times: dict[Drift, list[float]] = {}
-    for drift, time in drifts:
-        if isinstance(drift, Drift):
-            times.setdefault(drift, []).append(time)
+    times = by_key((drift, time) for drift, time in drifts if isinstance(drift, Drift))
     return {
         drift: float(np.mean(own)) if drift.epoch is None else drift.epoch for drift, own in times.items()
     }

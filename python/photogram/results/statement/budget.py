@@ -43,7 +43,8 @@ EXACT = 5000  # Rows up to which degrees of freedom are computed without estimat
 @dataclass(frozen=True)
 class Source:
     level: str  # `kind`, `strip`, `camera`, `photo`, `point`, `parameter` or `observation`
-    subject: Any  # Its name; of parameters as a message, of observations a type, names and a component
+    # Its name; of parameters as a message, of observations a type, names and a component
+    subject: str | Phrase | tuple[str, ...]
     number: int  # Number of rows
     # u_k^2 in the squared unit of the quantity, and its ratio to u^2
     contribution: float

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -88,6 +88,7 @@ def _budget(texts: Texts, own: Budget) -> list[Table]:
     origins = [texts("from.estimated" if math.isfinite(nu) else "from.given") for nu in dof]
     names = [texts.kind(each.name) for each in kinds]
     names += [f"– {texts(f'level.{each.level}', name=each.subject)}" for each in finer]
+    largest = [cast("tuple[str, ...]", each.subject) for each in own.largest]
 
     def shares(rows: Sequence[Source]) -> list[Quantity]:
         number = columns.number("u", [each.u for each in rows], unit=own.unit, figures=2)
@@ -102,7 +103,7 @@ def _budget(texts: Texts, own: Budget) -> list[Table]:
             columns.text("from", [*origins, *[""] * len(finer)]),
         ],
         [
-            columns.text("observation", [texts.observation(each.subject) for each in own.largest]),
+            columns.text("observation", [texts.observation(name) for name in largest]),
             columns.number("sd", [each.sd for each in own.largest]),
             columns.number("sensitivity", [each.sensitivity for each in own.largest]),
             *shares(own.largest),
