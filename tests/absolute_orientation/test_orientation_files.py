@@ -117,6 +117,10 @@ def test_errors_of_a_data_frame_name_column_and_station():
         Stations.from_table(TABLE.drop(columns=["Z", "y"]))
     assert missing.value.code == "orientation.missing-columns"
     assert missing.value.phrase.fields["names"] == ["Z", "y"]
+    with pytest.raises(InputError) as incomplete:
+        Stations.from_table(TABLE.drop(columns=["sd_y"]))
+    assert incomplete.value.code == "orientation.incomplete-sd"
+    assert incomplete.value.phrase.fields["names"] == ["sd_x", "sd_z"]
 
     for column, value, code in (
         ("y", np.inf, "orientation.model-coordinate"),

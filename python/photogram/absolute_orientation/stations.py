@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Container
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -99,7 +100,7 @@ class Stations(Brief):
         Raises
         ------
         InputError
-            If a column is missing, or the class raises it.
+            If a column is missing, also one of an incomplete set `sd_x`, `sd_y`, `sd_z`, or the class raises it.
         """
         missing = [name for name in ("id", *CONTROL_COLUMNS, *MODEL_COLUMNS) if name not in table]
         if missing:
@@ -107,7 +108,7 @@ class Stations(Brief):
         control_sd = [
             table[name].fillna(0.0) if name in table else 0.0 * table["x"] for name in CONTROL_SD_COLUMNS
         ]
-        weighted = all(name in table for name in MODEL_SD_COLUMNS)
+        weighted = _weighted(table)
         return cls(
             table["id"],
             table[list(CONTROL_COLUMNS)],
@@ -170,6 +171,14 @@ def header(place: Place) -> list[str]:
     return [SPELLINGS.get(cell, cell) for cell in cells(place)]
 
 
+def _weighted(table: Container[str]) -> bool:
+    """Return whether a table has the columns `sd_x`, `sd_y`, `sd_z`; InputError: if some are missing."""
+    names = [name for name in MODEL_SD_COLUMNS if name in table]
+    if names and len(names) < 3:
+        raise InputError(phrase("orientation.incomplete-sd", names=names))
+    return bool(names)
+
+
 def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = "model unit") -> Stations:
     """Read stations from a CSV file with a header.
 
@@ -198,10 +207,8 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
             raise table.error(row, phrase("orientation.no-id"))
         if known.setdefault(name, row) != row:
             raise table.error(row, phrase("orientation.repeated", station=name))
-    weighted = [name for name in MODEL_SD_COLUMNS if name in table.columns]
-    if weighted and len(weighted) < 3:
-        raise InputError(phrase("orientation.incomplete-sd", names=weighted), file=path)
-
+    with at_place(table.head):
+        weighted = _weighted(table)
     control, model = table.vectors(CONTROL_COLUMNS), table.given(MODEL_COLUMNS)
     control_sd = table.vectors(CONTROL_SD_COLUMNS, 0.0, infinite=True)
     model_sd = table.given(MODEL_SD_COLUMNS) if weighted else None
