@@ -66,13 +66,17 @@ class Job:
             [*given.get(role, ())] for role in (Reads.FILE, Reads.PROJECT, Writes.FILE, Writes.DIRECTORY)
         )
         self._spared: list[Path] = []
+        self._read = set[Path]()  # All files that are read during the job
         self._resources = ExitStack()
         self._examples: list[Path] = []
         self.name, self.quiet, self.is_example = name, quiet, False
 
     def __enter__(self) -> Job:
+        from photogram.io.files import paths_read
+
         with ExitStack() as resources:  # Converts an error of the checks
             resources.enter_context(failures())
+            resources.callback(paths_read.reset, paths_read.set(self._read))
             self._check()
             self._resources = resources.pop_all()
         return self
@@ -219,7 +223,7 @@ class Job:
         """Return a set of files for results that are written in several pieces."""
         from photogram.io.writing import OutputSet
 
-        return OutputSet([*self._inputs(), *self._spared])
+        return OutputSet([*self._inputs(), *self._spared, *self._read])
 
     def _inputs(self) -> list[Path]:
         inputs = list(self._files)
@@ -245,8 +249,7 @@ class Job:
             sources = [each for each in (*self._projects, *self._files) if each.is_dir()]
             if path.exists() and any(path.samefile(each) for each in sources):
                 raise InputError(phrase("command.over-input"), file=path)
-        inputs = self._inputs()
-        check_outputs(self._outputs, [*inputs, *self._spared], self._directories)
+        check_outputs(self._outputs, [*self._inputs(), *self._spared, *self._read], self._directories)
         for path in self._outputs:
             self._check_projects(path)
 
