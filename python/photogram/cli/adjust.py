@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from photogram.adjustment.options import Ordering
-from photogram.cli.console import NOT_CONVERGED, print_remark, print_sections, print_text
+from photogram.cli.console import NOT_CONVERGED, print_sections, print_text
 from photogram.cli.documents import Documents, check_maps
 from photogram.cli.job import Job, adjustment_status, with_job
 from photogram.cli.options import Input, OfSnooping, OutputFolder, Threads, Without, misuse
@@ -103,10 +103,9 @@ def adjust(
             own = stated(job, result, asked, assumed=project.lacks, **given)
     subject = removed or result
     code = result.verdict.exit_code(strict=strict)  # Releases the factor before the files are made
-    in_crs, more = _in_system(result, documents.crs, project.control_crs)
+    in_crs, more = _in_system(job, result, documents.crs, project.control_crs)
     files, remarks = project_files(project, result)
-    for refusal in remarks:
-        print_remark(refusal)
+    job.remark(*remarks)
     files |= in_crs
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()
@@ -123,7 +122,9 @@ def adjust(
     )
 
 
-def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[str, bytes], list[Chapter]]:
+def _in_system(
+    job: Job, result: Result, crs: str | None, of_control: str
+) -> tuple[dict[str, bytes], list[Chapter]]:
     """Return tables and sections of a result in a CRS, or in the control CRS."""
     if not (crs or of_control):
         return {}, []
@@ -135,7 +136,7 @@ def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[s
     except InputError as error:
         if crs:
             raise
-        print_remark(phrase("command.no-crs-results", crs=of_control, error=error))
+        job.remark(phrase("command.no-crs-results", crs=of_control, error=error))
         return {}, []
     files = {f"in_crs/{name}": each for name, each in placed_files(found).items()}
     return files, [placed_section(found)]
