@@ -11,7 +11,7 @@ from photogram.arguments.fields import option
 from photogram.cli.job import Job
 from photogram.cli.options import Changes, misuse, words_of
 from photogram.formats.read_options import ReadOptions
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, fields, replace
 
 if TYPE_CHECKING:
     from photogram.formats import Project
@@ -20,7 +20,7 @@ EXAMPLE = ("project",)  # The packaged example, a directory of photogram.example
 
 Choices = Annotated[
     Mapping[str, Any],
-    Changes(AdjustOptions, "datum", "loss", "unit_variance", "max_iterations", "max_bias_ratio"),
+    Changes(AdjustOptions, *(each.name for each in fields(AdjustOptions) if each.metadata)),
 ]
 """Options of an adjustment with precedence over the project."""
 
