@@ -67,8 +67,10 @@ def adjust(
         job.alone("--ordering", DIVIDING)
     documents.declare(job, pictures=None)
     parts = None if run is None and division == Division() else replace(division, folder=run)
-    on_disk = partial(adjusted_on_disk, job, path, documents.folder, choices=choices, threads=threads)
-    if parts and reading == ReadOptions() and on_disk(parts, is_plan=plan):
+    on_disk = partial(
+        adjusted_on_disk, job, path, reading, documents.folder, choices=choices, threads=threads
+    )
+    if parts and replace(reading, settings=(), sd={}) == ReadOptions() and on_disk(parts, is_plan=plan):
         return
     project = read_project(job, path, reading)
     check_maps(documents.map)  # now that all inputs are known, which it must not be
@@ -269,7 +271,7 @@ DIVIDING = ("--cluster", "--workers", "--parts", "--memory", "--run")
 TAKEN = frozenset(
     (
         *("PATH", "--out", "--no-html", "--quiet", "--threads", "--unit-variance", "--loss", "--keep-all"),
-        *(*DIVIDING, "--iterations", "--plan"),
+        *(*DIVIDING, "--iterations", "--plan", "--set", "--sd"),
     )
 )
 """Options for a project on disk; any other option is rejected."""
@@ -278,6 +280,7 @@ TAKEN = frozenset(
 def adjusted_on_disk(
     job: Job,
     path: Path,
+    reading: ReadOptions,
     target: Path,
     division: Division,
     choices: Mapping[str, Any],
@@ -288,14 +291,14 @@ def adjusted_on_disk(
     """Plan or adjust a project batch by batch; False if this is impossible."""
     from photogram.formats.in_parts import streamable
 
-    if not streamable(path, None if division.cluster else division.memory_bytes):
+    if not streamable(path, None if division.cluster else division.memory_bytes, reading):
         return False
     job.only(TAKEN, "in-batches", options=[each for each in job.given if each in DIVIDING])
     from photogram.formats import in_parts
     from photogram.show.forms import text
     from photogram.show.page import Section, Text
 
-    reading, folder = ReadOptions(), Path(division.folder or target / "run")
+    folder = Path(division.folder or target / "run")
     change = partial(replace, **choices)
     threads = None if is_plan else threads
     opened = in_parts.on_disk(path, reading, folder, division, change=change, threads=threads)
