@@ -50,7 +50,6 @@ def read_project(job: Job, path: Path, options: ReadOptions) -> Project:
     job.reads_inside(path)
     project = read(path, options)
     job.reads(*project.details.get("further inputs", ()))
-    job.spares(*project.details.get("photo pictures", ()))
     return project.replace(path=job.shown(project.path), messages=tuple(job.told(project.messages)))
 
 
