@@ -141,3 +141,9 @@ def test_quiet_plans_of_projects_print_no_remarks(run):
     assert "GROUND, record 19: control point SH954202" in loud.stderr
     assert "remark: galveston" in loud.stderr
     assert (quiet.stdout, quiet.stderr) == ("", "")
+
+
+def test_quiet_plans_of_parts_print_nothing(run):
+    loud, quiet = (run("adjust", "--example", "--plan", *words) for words in ((), ("--quiet",)))
+    assert "parts" in loud.stdout
+    assert (quiet.exit_code, quiet.output) == (0, "")

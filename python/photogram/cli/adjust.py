@@ -88,7 +88,7 @@ def adjust(
         from photogram.distributed import plan_in_parts
 
         planned = plan_in_parts(block, parts or division, project.options)
-        print_text(planned.document())
+        job.conclude((), summary=lambda: print_text(planned.document()))
         planned.check()
         return
     job.remark(*(started.messages if started is not None else ()))
@@ -305,7 +305,7 @@ def adjusted_on_disk(
     if is_plan:
         with opened as run:
             planned = run.plan()
-            print_text(planned.document())
+            job.conclude((), summary=lambda: print_text(planned.document()))
             planned.check()
         return True
     with adjustment_status(job) as progress, opened as run:
