@@ -134,3 +134,16 @@ def test_progress_is_told_in_words():
     tell = shown(lines.append, "weighted sum of squares", 1.0)
     tell(Progress("form", 61, 100, None))
     assert lines == ["normal equations 61 %"]
+
+
+def test_quiet_plans_of_projects_print_no_remarks(run):
+    loud, quiet = (run("plan", "--example", *words) for words in ((), ("--quiet",)))
+    assert "GROUND, record 19: control point SH954202" in loud.stderr
+    assert "remark: galveston" in loud.stderr
+    assert (quiet.stdout, quiet.stderr) == ("", "")
+
+
+def test_quiet_plans_of_parts_print_nothing(run):
+    loud, quiet = (run("adjust", "--example", "--plan", *words) for words in ((), ("--quiet",)))
+    assert "parts" in loud.stdout
+    assert (quiet.exit_code, quiet.output) == (0, "")

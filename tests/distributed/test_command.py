@@ -137,7 +137,7 @@ def test_every_option_is_taken_or_refused_of_a_project_on_disk():
         if each.name not in of_files | {"path", "example"}
     }
     of_statements = {"--project", "--client", "--firm", "--surveyor", "--date", "--class-h", "--class-v"}
-    assert options == REFUSED.keys() | of_statements | TAKEN - {"PATH"}
+    assert options == REFUSED.keys() | of_statements | TAKEN - {"PATH", "--set", "--sd"}
     assert not REFUSED.keys() & TAKEN
 
 
@@ -158,6 +158,19 @@ def test_options_that_exclude_parts_are_refused_before_the_project_is_read(tmp_p
     (tmp_path / "project.toml").write_text("not a project")
     said = called(tmp_path, "--parts", 3, *option, *plan, "--out", tmp_path / "out", code=2)
     assert f"Invalid value for {option[0]}: must not be combined with --parts" in " ".join(said.split())
+
+
+@pytest.mark.parametrize(
+    "words", ["--loss huber", "--set adjust.loss=huber", "--sd control=0.5 --loss huber"]
+)
+@pytest.mark.parametrize("parts", [["--parts", 3], ["--parts", 3, "--plan"]])
+def test_settings_of_the_user_do_not_read_a_project_on_disk_as_a_whole(tmp_path, project, words, parts):
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("photogram.cli.adjust.read_project", None)
+        called(project, *parts, *words.split(), "--keep-all", "--out", tmp_path / "out")
+    if len(parts) == 2:
+        nodes = [read_result(each) for each in (tmp_path / "out" / "run" / "results").iterdir()]
+        assert any((each.image_weights < 1).any() for each in nodes)
 
 
 @pytest.mark.parametrize(("said", "option"), [("huber", None), ("none", "huber"), ("huber", "none")])

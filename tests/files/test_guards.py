@@ -317,3 +317,74 @@ def test_the_packaged_example_is_an_input(run, tmp_path):
     assert result.exit_code == 1
     assert "must not be written over the input" in result.stderr
     assert packaged.read_bytes() == before
+
+
+def outside(folder, name, target, settings="project.toml"):
+    """Move a file of a project to another folder."""
+    target.parent.mkdir(exist_ok=True)
+    shutil.move(folder / name, target)
+    path = folder / settings
+    moved = os.path.relpath(target, folder)
+    text = path.read_text()
+    known = text.replace(f'"{name}"', f'"{moved}"')
+    path.write_text(known if known != text else text.replace("[tables]", f'[tables]\nimages = "{moved}"'))
+
+
+@pytest.mark.parametrize("output", [("info", "--json"), ("adjust", "--quiet", "--no-html", "--json")])
+@pytest.mark.parametrize("is_file", [False, True])
+def test_a_table_outside_the_folder_of_its_project_is_an_input(run, tmp_path, output, is_file):
+    project = tmp_path / "project"
+    shutil.copytree(EXAMPLES / "project", project)
+    outside(project, "images.csv", tmp_path / "other" / "images.csv")
+    before = content(tmp_path)
+    for path in (tmp_path / "other" / "images.csv", *([project / "photos.csv"] if is_file else [])):
+        command, *options = output
+        result = run(command, project / "project.toml" if is_file else project, *options, path)
+        assert result.exit_code == 1
+        assert f"{path.name}: the result must not be written over the input" in result.stderr
+        assert content(tmp_path) == before
+
+
+def test_a_table_of_parquet_outside_the_folder_of_its_project_is_an_input(run, tmp_path):
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("pyarrow")
+    project, images = tmp_path / "project", tmp_path / "other.parquet"
+    shutil.copytree(EXAMPLES / "project", project)
+    table = pandas.read_csv(project / "images.csv", comment="#")
+    outside(project, "images.csv", images)
+    table.to_parquet(images)
+    before = images.read_bytes()
+    result = run("info", project, "--json", images)
+    assert result.exit_code == 1
+    assert "must not be written over the input" in result.stderr
+    assert images.read_bytes() == before
+
+
+def test_a_certificate_outside_the_folder_of_its_project_is_an_input(run, tmp_path):
+    archive, certificate = tmp_path / "archive", tmp_path / "cameras" / "rc10.toml"
+    shutil.copytree(EXAMPLES / "archive", archive)
+    outside(archive, "rc10-2345.toml", certificate)
+    before = certificate.read_bytes()
+    result = run("info", archive, "--json", certificate)
+    assert result.exit_code == 1
+    assert "must not be written over the input" in result.stderr
+    assert certificate.read_bytes() == before
+
+
+@pytest.mark.parametrize("plan", [(), ("--plan", "4", "--field", "60", "--size", "1600x1200")])
+def test_the_board_of_a_calibration_is_an_input(run, tmp_path, plan):
+    shutil.copytree(EXAMPLES / "board", tmp_path / "views")
+    board = tmp_path / "board.toml"
+    shutil.move(tmp_path / "views" / "board.toml", board)
+    before = board.read_bytes()
+    path = () if plan else (tmp_path / "views",)
+    result = run("calibrate", *path, *plan, "--board", board, "--json", board, "--no-html")
+    assert result.exit_code == 1
+    assert "must not be written over the input" in result.stderr
+    assert board.read_bytes() == before
+
+
+def test_results_may_be_written_again(run, tmp_path):
+    shutil.copytree(EXAMPLES / "project", tmp_path / "project")
+    line = ("adjust", tmp_path / "project", "--json", tmp_path / "result.json", "--no-html", "--quiet")
+    assert [run(*line).exit_code for _ in range(2)] == [0, 0]

@@ -5,6 +5,7 @@ import os
 import shutil
 import subprocess
 import sys
+from dataclasses import fields
 from importlib.resources import files
 from pathlib import Path
 from typing import get_args
@@ -12,8 +13,10 @@ from typing import get_args
 import pytest
 from typer.models import ArgumentInfo, OptionInfo
 
+from photogram import AdjustOptions, formats
 from photogram.cli import app
 from photogram.cli.options import Writes
+from photogram.formats.plain.settings import KEYS
 
 PROMPT = [
     sys.executable,
@@ -23,11 +26,11 @@ PROMPT = [
 """The command under its own name, by which shells know it."""
 
 
-def registered(typer_app=app):
+def registered(typer_app=app, before=""):
     """Return the functions of all commands by their names."""
-    found = {each.name or each.callback.__name__: each.callback for each in typer_app.registered_commands}
+    found = {before + each.name: each.callback for each in typer_app.registered_commands}
     for group in typer_app.registered_groups:
-        found |= registered(group.typer_instance)
+        found |= registered(group.typer_instance, f"{group.typer_instance.info.name} ")
     return found
 
 
@@ -54,9 +57,26 @@ def test_an_option_means_the_same_for_every_command(name):
     for option, marks in same.items():
         assert shown.get(option, (None, marks))[1] == marks
     assert not {"plot", "pictures", "report"} & set(shown)
-    assert "listing" not in shown or name == "adjust"
-    assert "quiet" in shown or name == "correct"
+    assert "listing" not in shown or name == "giant adjust"
+    assert "quiet" in shown or name == "comparator correct"
     assert "out" in shown or "plots" not in shown
+
+
+def test_an_option_of_adjustments_is_a_key_of_projects_and_an_option_of_the_command(tmp_path):
+    declared = {each.name: each.metadata["kind"] for each in fields(AdjustOptions) if each.metadata}
+    keys = {each.field.removeprefix("options."): each for each in KEYS if each.section == "adjust"}
+    assert set(declared) == set(keys)
+    assert set(declared) <= set(options(COMMANDS["adjust"]))
+    for name, words in declared.items():
+        assert set(get_args(words)) <= set(keys[name].words.split())
+    chosen = AdjustOptions(
+        datum="inner", unit_variance="unity", loss="huber", max_iterations=7, max_bias_ratio=3.0
+    )
+    assert all(getattr(chosen, each.name) != each.default for each in fields(chosen) if each.metadata)
+    project = formats.read(Path(str(files("photogram") / "examples" / "project"))).replace(options=chosen)
+    for name, content in formats.to_files(project, "plain").items():
+        (tmp_path / name).write_bytes(content)
+    assert formats.read(tmp_path).options == chosen
 
 
 def test_no_option_is_hidden():

@@ -10,6 +10,7 @@ from test_plain_project import EXAMPLE, written
 
 from message_codes import refused
 from photogram import Attitudes, adjust, formats
+from photogram.formats import xml_stream
 from photogram.formats.description import agreement
 from photogram.words import option_sd
 
@@ -148,6 +149,14 @@ def test_a_fault_is_named_with_its_line(tmp_path, old, new, words):
     path.write_text(text.replace(old, new, 1))
     with refused("block.xml", *words):
         formats.read(path, file_format="blocks_exchange")
+
+
+def test_a_group_may_have_any_number_of_photos(tmp_path, monkeypatch):
+    path = written(formats.read(EXAMPLE), tmp_path / "there", "blocks_exchange") / "block.xml"
+    photos = path.read_text().split("<Photo>")[1:]
+    assert sum(photo.count("</") for photo in photos) > 120
+    monkeypatch.setattr(xml_stream, "MOST", 120)
+    assert len(formats.read(path).block.photo_ids) == len(photos)
 
 
 def test_entities_are_not_read(tmp_path):

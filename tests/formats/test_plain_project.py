@@ -27,6 +27,7 @@ from photogram import (
     simulate,
 )
 from photogram.formats.plain.schema import TABLES
+from photogram.formats.plain.settings import KEYS
 from photogram.formats.supplements import self_calibrated
 from photogram.io import delimited
 from photogram.io.delimited import read_columns
@@ -648,3 +649,19 @@ def test_a_written_project_keeps_the_comments_of_its_settings(example, tmp_path)
 def test_declared_words_are_those_of_the_classes(table, column, words):
     declared = TABLES[table].words[column]
     assert set(declared) == set(get_args(words))
+
+
+def test_the_settings_of_the_example_show_declared_keys_and_words():
+    keys = {(key.section, key.name): key for key in KEYS}
+    section, shown = "", set()
+    for line in (EXAMPLE / "project.toml").read_text().splitlines():
+        if head := re.match(r"(?:# )?\[(\w+)\]", line):
+            section = head[1]
+        elif (entry := re.match(r"(?:# )?(\w+) = .*?(?:  +# (.*))?$", line)) and (section, entry[1]) in keys:
+            shown.add((section, entry[1]))
+            words = keys[section, entry[1]].words.split()
+            if words and entry[2] and " | " in entry[2]:
+                listed = entry[2].split(" | ")
+                expected = [word for word in words if word != "free"]  # Of earlier versions
+                assert {*listed} - {"..."} <= {*expected} if "..." in listed else listed == expected, line
+    assert {key for key in keys if key[0] in ("units", "axes", "adjust")} <= shown

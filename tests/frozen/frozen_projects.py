@@ -24,6 +24,8 @@ from photogram import formats
 
 TESTS = Path(__file__).parents[1]
 FILE = TESTS / "data" / "frozen" / "projects.json.xz"
+MORE = FILE.with_name("columns.json.xz")
+"""Variants of the examples of commit ae1d3bec with the other keys, words and columns, read by its package."""
 LISTED = 12
 """Longer lists of texts are stored as their length and a checksum."""
 FIELDS = (

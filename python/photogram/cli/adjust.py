@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, cast
 
 from photogram.adjustment.options import Ordering
-from photogram.cli.console import NOT_CONVERGED, print_remark, print_sections, print_text
+from photogram.cli.console import NOT_CONVERGED, print_sections, print_text
 from photogram.cli.documents import Documents, check_maps
 from photogram.cli.job import Job, adjustment_status, with_job
 from photogram.cli.options import Input, OfSnooping, OutputFolder, Threads, Without, misuse
@@ -67,8 +67,10 @@ def adjust(
         job.alone("--ordering", DIVIDING)
     documents.declare(job, pictures=None)
     parts = None if run is None and division == Division() else replace(division, folder=run)
-    on_disk = partial(adjusted_on_disk, job, path, documents.folder, choices=choices, threads=threads)
-    if parts and reading == ReadOptions() and on_disk(parts, is_plan=plan):
+    on_disk = partial(
+        adjusted_on_disk, job, path, reading, documents.folder, choices=choices, threads=threads
+    )
+    if parts and replace(reading, settings=(), sd={}) == ReadOptions() and on_disk(parts, is_plan=plan):
         return
     project = read_project(job, path, reading)
     check_maps(documents.map)  # now that all inputs are known, which it must not be
@@ -86,7 +88,7 @@ def adjust(
         from photogram.distributed import plan_in_parts
 
         planned = plan_in_parts(block, parts or division, project.options)
-        print_text(planned.document())
+        job.conclude((), summary=lambda: print_text(planned.document()))
         planned.check()
         return
     job.remark(*(started.messages if started is not None else ()))
@@ -103,10 +105,9 @@ def adjust(
             own = stated(job, result, asked, assumed=project.lacks, **given)
     subject = removed or result
     code = result.verdict.exit_code(strict=strict)  # Releases the factor before the files are made
-    in_crs, more = _in_system(result, documents.crs, project.control_crs)
+    in_crs, more = _in_system(job, result, documents.crs, project.control_crs)
     files, remarks = project_files(project, result)
-    for refusal in remarks:
-        print_remark(refusal)
+    job.remark(*remarks)
     files |= in_crs
     if removed is not None:
         files["removed.csv"] = removed.table().to_csv(index=False).encode()
@@ -123,7 +124,9 @@ def adjust(
     )
 
 
-def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[str, bytes], list[Chapter]]:
+def _in_system(
+    job: Job, result: Result, crs: str | None, of_control: str
+) -> tuple[dict[str, bytes], list[Chapter]]:
     """Return tables and sections of a result in a CRS, or in the control CRS."""
     if not (crs or of_control):
         return {}, []
@@ -135,7 +138,7 @@ def _in_system(result: Result, crs: str | None, of_control: str) -> tuple[dict[s
     except InputError as error:
         if crs:
             raise
-        print_remark(phrase("command.no-crs-results", crs=of_control, error=error))
+        job.remark(phrase("command.no-crs-results", crs=of_control, error=error))
         return {}, []
     files = {f"in_crs/{name}": each for name, each in placed_files(found).items()}
     return files, [placed_section(found)]
@@ -268,7 +271,7 @@ DIVIDING = ("--cluster", "--workers", "--parts", "--memory", "--run")
 TAKEN = frozenset(
     (
         *("PATH", "--out", "--no-html", "--quiet", "--threads", "--unit-variance", "--loss", "--keep-all"),
-        *(*DIVIDING, "--iterations", "--plan"),
+        *(*DIVIDING, "--iterations", "--plan", "--set", "--sd"),
     )
 )
 """Options for a project on disk; any other option is rejected."""
@@ -277,6 +280,7 @@ TAKEN = frozenset(
 def adjusted_on_disk(
     job: Job,
     path: Path,
+    reading: ReadOptions,
     target: Path,
     division: Division,
     choices: Mapping[str, Any],
@@ -287,21 +291,21 @@ def adjusted_on_disk(
     """Plan or adjust a project batch by batch; False if this is impossible."""
     from photogram.formats.in_parts import streamable
 
-    if not streamable(path, None if division.cluster else division.memory_bytes):
+    if not streamable(path, None if division.cluster else division.memory_bytes, reading):
         return False
     job.only(TAKEN, "in-batches", options=[each for each in job.given if each in DIVIDING])
     from photogram.formats import in_parts
     from photogram.show.forms import text
     from photogram.show.page import Section, Text
 
-    reading, folder = ReadOptions(), Path(division.folder or target / "run")
+    folder = Path(division.folder or target / "run")
     change = partial(replace, **choices)
     threads = None if is_plan else threads
     opened = in_parts.on_disk(path, reading, folder, division, change=change, threads=threads)
     if is_plan:
         with opened as run:
             planned = run.plan()
-            print_text(planned.document())
+            job.conclude((), summary=lambda: print_text(planned.document()))
             planned.check()
         return True
     with adjustment_status(job) as progress, opened as run:

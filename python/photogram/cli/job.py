@@ -65,14 +65,17 @@ class Job:
         self._files, self._projects, self._outputs, self._directories = (
             [*given.get(role, ())] for role in (Reads.FILE, Reads.PROJECT, Writes.FILE, Writes.DIRECTORY)
         )
-        self._spared: list[Path] = []
+        self._read = set[Path]()  # All files that are read during the job
         self._resources = ExitStack()
         self._examples: list[Path] = []
         self.name, self.quiet, self.is_example = name, quiet, False
 
     def __enter__(self) -> Job:
+        from photogram.io.files import paths_read
+
         with ExitStack() as resources:  # Converts an error of the checks
             resources.enter_context(failures())
+            resources.callback(paths_read.reset, paths_read.set(self._read))
             self._check()
             self._resources = resources.pop_all()
         return self
@@ -120,11 +123,6 @@ class Job:
         """Protect the files in a folder against results; see :meth:`reads`."""
         if folder.is_dir():
             self.reads(*(each for each in sorted(folder.iterdir()) if each.is_file()))
-
-    def spares(self, *paths: Path) -> None:
-        """Protect further files against results; reports do not list them as inputs."""
-        self._spared += paths
-        self._check()
 
     def writes(self, *files: Path) -> None:
         """Declare further outputs, and check them now."""
@@ -219,7 +217,7 @@ class Job:
         """Return a set of files for results that are written in several pieces."""
         from photogram.io.writing import OutputSet
 
-        return OutputSet([*self._inputs(), *self._spared])
+        return OutputSet([*self._inputs(), *self._read])
 
     def _inputs(self) -> list[Path]:
         inputs = list(self._files)
@@ -245,8 +243,7 @@ class Job:
             sources = [each for each in (*self._projects, *self._files) if each.is_dir()]
             if path.exists() and any(path.samefile(each) for each in sources):
                 raise InputError(phrase("command.over-input"), file=path)
-        inputs = self._inputs()
-        check_outputs(self._outputs, [*inputs, *self._spared], self._directories)
+        check_outputs(self._outputs, [*self._inputs(), *self._read], self._directories)
         for path in self._outputs:
             self._check_projects(path)
 

@@ -12,7 +12,7 @@ import typer
 from rich.markup import escape
 
 from photogram.cli.check import GALVESTON
-from photogram.cli.console import output, print_remark
+from photogram.cli.console import output
 from photogram.cli.documents import TEXT, OfPrograms
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Changes, Reads, Without, Writes, misuse
@@ -211,7 +211,7 @@ def plan(
         simulated = network, space, bent, moves, against, against_spacing, against_position_sd
         if simulated != (SimulationOptions(), SpaceOptions(), {}, MotionOptions(), "corners", None, None):
             raise misuse("DIR", "simulation")
-        patterns = _adjusted(projects)
+        patterns = _adjusted(job, projects)
     else:
         second = replace(
             network,
@@ -239,7 +239,7 @@ def _name(network: SimulationOptions) -> str:
     return names[network.control] + (f", positions {network.position_sd:g} m" if weighted else "")
 
 
-def _adjusted(projects: list[Path]) -> dict[str, Block]:
+def _adjusted(job: Job, projects: list[Path]) -> dict[str, Block]:
     """Read and adjust projects, so that all points have positions."""
     from photogram import adjust
     from photogram.adjustment.prediction import at_adjusted
@@ -249,8 +249,7 @@ def _adjusted(projects: list[Path]) -> dict[str, Block]:
     for name, directory in _names(projects).items():
         project = read_project(directory)
         block = project.to_block()
-        for message in project.messages:
-            print_remark(message)
+        job.remark(*job.told(project.messages))
         if project.common.intersection_only:
             block = block.with_fixed_photos()
         patterns[name] = at_adjusted(adjust(block, covariance=False))

@@ -107,7 +107,6 @@ def metadata(
     given = deviations(sd or [])
     found = read_metadata(path, mrk_antenna=mrk_antenna)
     job.reads(*found.tables)
-    job.spares(*found.pictures)
     files = {} if out is None else gnss_files(found, out, photos_crs, given.get("gnss"))
     job.finish(files, summary=lambda: print_sections(found.document(), "--out FILE"))
 

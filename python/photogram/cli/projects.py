@@ -11,7 +11,7 @@ from photogram.arguments.fields import option
 from photogram.cli.job import Job
 from photogram.cli.options import Changes, misuse, words_of
 from photogram.formats.read_options import ReadOptions
-from photogram.lazy_dataclasses import dataclass, replace
+from photogram.lazy_dataclasses import dataclass, fields, replace
 
 if TYPE_CHECKING:
     from photogram.formats import Project
@@ -20,7 +20,7 @@ EXAMPLE = ("project",)  # The packaged example, a directory of photogram.example
 
 Choices = Annotated[
     Mapping[str, Any],
-    Changes(AdjustOptions, "datum", "loss", "unit_variance", "max_iterations", "max_bias_ratio"),
+    Changes(AdjustOptions, *(each.name for each in fields(AdjustOptions) if each.metadata)),
 ]
 """Options of an adjustment with precedence over the project."""
 
@@ -50,7 +50,6 @@ def read_project(job: Job, path: Path, options: ReadOptions) -> Project:
     job.reads_inside(path)
     project = read(path, options)
     job.reads(*project.details.get("further inputs", ()))
-    job.spares(*project.details.get("photo pictures", ()))
     return project.replace(path=job.shown(project.path), messages=tuple(job.told(project.messages)))
 
 

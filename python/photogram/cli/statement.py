@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from photogram.cli.adjust import result_at
-from photogram.cli.console import print_document, print_remark
+from photogram.cli.console import print_document
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Input, OutputFolder, Threads
 from photogram.cli.projects import Choices, Unknowns
@@ -70,5 +70,5 @@ def _project_beside(job: Job, folder: Path, result: Result) -> Project | None:
     own, block = result.block, project.block
     if set(own.photo_ids) == set(block.photo_ids) and set(own.point_ids) == set(block.point_ids):
         return project
-    print_remark(phrase("command.other-block", settings=settings, folder=folder))
+    job.remark(phrase("command.other-block", settings=settings, folder=folder))
     return None

@@ -60,6 +60,7 @@ class _Reader(BlockBuilder):
         self.given_sd, self.systems = options.sd, dict[str, str]()
         self.axes: list[Floats] = []  # Of each camera
         self.positions = 0  # Number of observed positions
+        self.waiting: list[tuple[Any, ...]] = []  # Photos of a group, whose elements need far more memory
         self.measured: list[tuple[int, int, float, float, bool]] = []
         """Photo id, point, x, y, and whether these are millimetres from the principal point."""
         self.in_millimetres: Element | None = None  # The first observation in millimetres
@@ -70,6 +71,7 @@ def read(path: Path, options: ReadOptions) -> Project:
     found = _Reader(path, options)
     take: dict[str, Callable[[Element], None]] = {
         "SRS": lambda own: found.systems.__setitem__(own.word("Id"), own.word("Definition")),
+        "Photo": partial(_photo, found),
         "Photogroup": partial(_group, found),
         "ControlPoint": partial(_control, found),
         "TiePoint": partial(_tie, found),
@@ -100,8 +102,16 @@ def _group(found: _Reader, element: Element) -> None:
     found.camera(camera, size, pixel, key=len(found.axes))
     found.axes.append(axes)
     srs = element.word("SRSId")
-    for photo in element.all("Photo"):
-        _photo(found, photo, srs)
+    for photo, number, path, pose, observed in found.waiting:
+        found.photo(number, len(found.axes) - 1, photo, name=path)
+        if pose is not None:
+            centre, rotation, crs = pose
+            found.pose(number, centre, (axes.T @ rotation).T, crs=crs or srs)
+        if observed is not None:
+            found.positions += 1
+            if (sd := found.given_sd.get("gnss")) is not None:
+                found.gnss(number, observed[0], sd, crs=observed[1] or crs or srs)
+    found.waiting.clear()
 
 
 def _camera(element: Element, size: Size, axes: Floats, pixel: float | None, name: str) -> Camera:
@@ -135,24 +145,22 @@ def _camera(element: Element, size: Size, axes: Floats, pixel: float | None, nam
     return Camera("full_opencv", {"fx": f, "fy": fy, "cx": float(cx), "cy": float(cy), **own}, name=name)
 
 
-def _photo(found: _Reader, element: Element, srs: str) -> None:
+def _photo(found: _Reader, element: Element) -> None:
     number, path, pose = element.whole("Id"), element.word("ImagePath"), element.child("Pose")
     if not path:
         raise element.error(phrase("format.member", name="ImagePath"))
-    found.photo(number, len(found.axes) - 1, element, name=path)
-    if pose is None:
-        return
-    centre, rotation = np.full(3, np.nan), np.full((3, 3), np.nan)
-    if (own := pose.child("Center")) is not None:
-        centre, srs = _position(own), own.word("SRSId") or srs
-    if (turn := pose.child("Rotation")) is not None:
-        rotation = found.axes[-1].T @ _rotation(turn)
-    found.pose(number, centre, rotation.T, crs=srs)
-    metadata = pose.child("Metadata")
-    if metadata is not None and (own := metadata.child("Center")) is not None:
-        position, found.positions = _position(own), found.positions + 1
-        if (sd := found.given_sd.get("gnss")) is not None:
-            found.gnss(number, position, sd, crs=metadata.word("SRSId") or srs)
+    given, observed = None, None
+    if pose is not None:
+        centre, rotation, srs = np.full(3, np.nan), np.full((3, 3), np.nan), ""
+        if (own := pose.child("Center")) is not None:
+            centre, srs = _position(own), own.word("SRSId")
+        if (turn := pose.child("Rotation")) is not None:
+            rotation = _rotation(turn)
+        given, metadata = (centre, rotation, srs), pose.child("Metadata")
+        if metadata is not None and (own := metadata.child("Center")) is not None:
+            observed = _position(own), metadata.word("SRSId")
+    element.children.clear()
+    found.waiting.append((element, number, path, given, observed))
 
 
 def _position(element: Element) -> Floats:

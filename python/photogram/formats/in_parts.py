@@ -75,7 +75,7 @@ _EMPTY: _Arrays = {
 _INNER = (Fiducial, KnownFilm, KnownTogether, Prior)  # Observations that do not define a datum
 
 
-def streamable(path: Path, memory: int | None = None) -> bool:
+def streamable(path: Path, memory: int | None = None, reading: ReadOptions | None = None) -> bool:
     """Return whether the images of a project are read in batches.
 
     Images in Parquet are; a text also is if it is larger than its share of the memory in bytes.
@@ -83,7 +83,7 @@ def streamable(path: Path, memory: int | None = None) -> bool:
     place = path / SETTINGS if path.is_dir() else path
     if place.suffix != ".toml" or not place.is_file():
         return False
-    settings = read_settings(place)
+    settings = read_settings(place, reading)
     images = settings.tables.get("images")
     if images is None or "photos" not in settings.tables or settings.photo_files is not None:
         return False

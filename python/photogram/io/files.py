@@ -5,6 +5,7 @@ from __future__ import annotations
 import codecs
 from collections.abc import Iterator
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 from photogram.errors import InputError
@@ -13,12 +14,16 @@ from photogram.words import phrase
 
 HEAD = 4096  # Bytes in which two-byte encodings without byte order mark are detected
 
+paths_read = ContextVar[set[Path]]("paths_read")
+"""Set that receives the paths of all files that are read."""
+
 
 @contextmanager
 def reading(path: Path) -> Iterator[None]:
     """Convert an :class:`OSError` to an :class:`InputError` that names the file."""
     if "\0" in str(path):
         raise InputError(phrase("file.nul"), file=path)
+    paths_read.get(set()).add(path)
     try:
         yield
     except OSError as error:

@@ -104,9 +104,8 @@ def _with_positions(
     lacks = list(project.lacks)
     if lacking:
         lacks.append(Phrase("read.positions", {"n": lacking, "option": option_sd("gnss")}))
-    read = {"further inputs": metadata.tables, "photo pictures": metadata.pictures}
-    read = {name: (*project.details.get(name, ()), *paths) for name, paths in read.items()}
-    details = {**project.details, **read}
+    inputs = (*project.details.get("further inputs", ()), *metadata.tables)
+    details = {**project.details, "further inputs": inputs}
     project = project.replace(messages=(*project.messages, *messages), lacks=tuple(lacks), details=details)
     if not photos:
         return project

@@ -17,7 +17,7 @@ from photogram.formats.plain.films import WrittenFilms
 from photogram.formats.plain.observations import observation_tables
 from photogram.formats.plain.rigs import Rigs, line_times_table, moving_columns
 from photogram.formats.plain.schema import AXES, OPK, TABLES, deviation_columns
-from photogram.formats.plain.settings import LENGTHS, VERSION, Settings, asked_files, key_tables
+from photogram.formats.plain.settings import KEYS, LENGTHS, VERSION, Settings, asked_files, key_tables
 from photogram.formats.plain.statement_tables import COVERS
 from photogram.formats.plain.tables import (
     columns_of,
@@ -136,11 +136,11 @@ def _settings(project: Project, image_y: str, films: WrittenFilms) -> str:
         "image_y": image_y,
         "rotation": "photo_to_object" if block.photo_to_ground else None,
         "interior": "before" if films.before else None,
-        "options.loss": options.loss or "none",
     }
     values |= {f"frame.{name}": getattr(frame, name) for name in ("kind", "origin")}
-    names = ("datum", "unit_variance", "max_iterations", "max_bias_ratio")
-    values |= {f"options.{name}": getattr(options, name) for name in names}
+    names = [each.field for each in KEYS if each.field.startswith("options.")]
+    values |= {name: getattr(options, name.removeprefix("options.")) for name in names}
+    values["options.loss"] = options.loss or "none"
     if isinstance(settings, Settings) and settings.times:
         values |= {"time_origin": settings.time_origin, "time_scale": settings.time_scale}
     features = {quoted_text(name): {kind: points} for name, (kind, points) in project.features.items()}
