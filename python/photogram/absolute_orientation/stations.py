@@ -100,7 +100,7 @@ class Stations(Brief):
         Raises
         ------
         InputError
-            If a column is missing, also one of an incomplete set `sd_x`, `sd_y`, `sd_z`, or the class raises it.
+            If a column is missing, only a part of `sd_x`, `sd_y`, `sd_z` exists, or the class raises it.
         """
         missing = [name for name in ("id", *CONTROL_COLUMNS, *MODEL_COLUMNS) if name not in table]
         if missing:
