@@ -68,6 +68,11 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
+def coded(messages: Iterable[Message | Phrase | str]) -> list[dict[str, str]]:
+    """Return messages as members of JSON documents; a plain sentence has no code."""
+    return [{"code": getattr(each, "code", ""), "text": str(each)} for each in messages]
+
+
 def listed(names: list[str], most: int = MOST_NAMES) -> str:
     """List up to `most` names, followed by the number of the others."""
     shown = ", ".join(names[:most])

@@ -18,6 +18,7 @@ from photogram.adjustment.first_values import first_values
 from photogram.arguments.types import Floats
 from photogram.errors import InputError, RankError, message_of
 from photogram.lazy_dataclasses import dataclass
+from photogram.messages import coded
 from photogram.network.block import Block, refuse_trajectories
 from photogram.network.datum import MinimumConstraints
 from photogram.network.motion import kept_images, of_photos
@@ -99,6 +100,7 @@ class Strip(Documented):
                 Section.of(Table("models", "Models", models)),
                 Section.of(Table("joints", "Joints", joints)),
             ],
+            members={"messages": coded(unchecked)},
         )
 
     @property

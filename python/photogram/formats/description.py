@@ -15,7 +15,7 @@ from photogram.formats.plain.settings import Settings
 from photogram.formats.plain.trajectories import shared_trajectories
 from photogram.formats.project import Project
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.messages import Message, listed
+from photogram.messages import Message, coded, listed
 from photogram.network.cameras import Camera, images_of
 from photogram.network.film_reduction import camera_images, camera_unit
 from photogram.network.motion import given_poses, on_shared, timed_images
@@ -62,8 +62,9 @@ def described(project: Project) -> Document:
             "frame": project.frame,
             "unit": project.block.linear_unit,
             "image_unit": project.block.image_unit,
-            "lacks": [{"code": each.code, "text": str(each)} for each in project.lacks],
-            "messages": [{"code": each.code, "text": str(each)} for each in remarks],
+            "median_residual": found.median,
+            "lacks": coded(project.lacks),
+            "messages": coded(remarks),
         },
     )
 

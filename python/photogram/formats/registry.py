@@ -28,7 +28,7 @@ from photogram.io.places import Place, at_place, one_word
 from photogram.lazy_dataclasses import dataclass
 from photogram.memory import give_back, turned
 from photogram.results.result import Result
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 _TO_WRITE: Mapping[str, Format] = ChainMap(FORMATS_OF_CAMERAS, FORMATS)  # The order is that of FORMATS
 SD = ("images", "control", "check", "gnss")
@@ -204,7 +204,12 @@ def target(path: Path, file_format: str | None = None) -> Target:
 
 
 def cannot_hold(project: Project, file_format: str) -> list[str]:
-    """Return the parts of a project that a format cannot contain, in sentences.
+    """Return the parts of a project that a format cannot contain, in sentences; see :func:`losses`."""
+    return [*map(str, losses(project, file_format))]
+
+
+def losses(project: Project, file_format: str) -> list[Phrase | str]:
+    """Return the parts of a project that a format cannot contain.
 
     Raises
     ------
@@ -214,7 +219,7 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
     chosen = _named(file_format, _TO_WRITE)
     if chosen.name != "plain":
         check_images(project.block, chosen.title)
-    found = [] if chosen.geographic else topocentric_remarks(project)
+    found: list[Phrase | str] = [] if chosen.geographic else [*topocentric_remarks(project)]
     fitting = _fitting(project, chosen)
     found += [] if chosen.holds is None else lost(fitting, chosen.holds)
     found += chosen.cannot_hold(fitting)
@@ -224,7 +229,7 @@ def cannot_hold(project: Project, file_format: str) -> list[str]:
         found += parts_of_asked(project.statement)
         parts = zip(("features", "trajectories", "moments"), counts, strict=True)
         found += [phrase(f"lost.{part}", n=n) for part, n in parts if n]
-    return [str(part) for part in [*found, *(nominal_pixels(project) if chosen.pixels else [])]]
+    return [*found, *(nominal_pixels(project) if chosen.pixels else [])]
 
 
 def adjusting(project: Project, adjust: Callable[..., Result]) -> Callable[..., Result]:

@@ -30,7 +30,7 @@ from photogram.formats.metadata.record import (
 from photogram.formats.plain.schema import TABLES
 from photogram.io.files import reading
 from photogram.lazy_dataclasses import dataclass, field
-from photogram.messages import Message
+from photogram.messages import Message, coded
 from photogram.show.judgement import remarks_section
 from photogram.show.methods import Documented
 from photogram.show.page import Document, Fact, Facts, Section
@@ -230,13 +230,14 @@ class Metadata(Documented):
         records = list(self.photos.values())
         located = [each for each in records if each.position is not None]
         flights = by_key((each.flight, each) for each in located)
+        positions, deviations = counts(each.position for each in records), self.sources()
+        remarks = [*self.messages, *remarks_on(located)]
+        numbers = {"pictures": len(self.pictures), "tables": len(self.tables), "photos": len(records)}
         files = [
             Fact("Folder", str(self.directory)),
-            Fact.of("Pictures", len(self.pictures)),
-            Fact.of("Tables", len(self.tables)),
-            Fact.of("Photos", len(records)),
-            Fact("Positions", told(counts(each.position for each in records))),
-            Fact("Standard deviations of positions", told(self.sources())),
+            *(Fact.of(name.capitalize(), number) for name, number in numbers.items()),
+            Fact("Positions", told(positions)),
+            Fact("Standard deviations of positions", told(deviations)),
         ]
         columns = [
             column("flight", list(flights), "Flight", kind="name"),
@@ -246,9 +247,11 @@ class Metadata(Documented):
         sections = [
             Section("read", "Read", [Facts("", files)]),
             Section.of(Table("flights", "Flights", columns)),
-            remarks_section([*self.messages, *remarks_on(located)]),
+            remarks_section(remarks),
         ]
-        return Document("Positions of photographs", "", sections=sections)
+        members = {"path": str(self.directory), **numbers, "positions": positions, "position_sd": deviations}
+        members["messages"] = coded(remarks)
+        return Document("Positions of photographs", "", sections=sections, members=members)
 
 
 def counts(sources: Iterable[Said | None]) -> dict[str, int]:
