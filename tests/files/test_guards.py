@@ -103,12 +103,15 @@ def outputs(name, role=Writes.FILE):
 
 
 def words(name, **given):
-    """Return the command line of a command with values for some of its outputs."""
+    """Return the command line of a command with all arguments, and values for some of its outputs."""
     found = list(RUNS[name][0])
     parameters = inspect.signature(COMMANDS[name], eval_str=True).parameters
+    for option, role in roles(COMMANDS[name]).items():
+        marks = parameters[option].annotation.__metadata__
+        if isinstance(role, Writes) and any(isinstance(each, ArgumentInfo) for each in marks):
+            found.append(given.pop(option, "other"))
     for option, value in given.items():
-        argument = any(isinstance(each, ArgumentInfo) for each in parameters[option].annotation.__metadata__)
-        found += [value] if argument else [f"--{option.replace('_', '-')}", value]
+        found += [f"--{option.replace('_', '-')}", value]
     return found
 
 

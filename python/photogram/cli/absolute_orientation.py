@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 from rich.markup import escape
 
-from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_document, print_sections
+from photogram.cli.console import NOT_CONVERGED, NOT_USABLE, output, print_document
 from photogram.cli.documents import TEXT, OfPrograms
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Input, InputFile, OutputFile, Reads, Writes, misuse
@@ -67,7 +67,7 @@ def absolute_orientation(
         restart_record,
         transformation_records,
     )
-    from photogram.absolute_orientation.stream import Document, decimals_for
+    from photogram.absolute_orientation.stream import decimals_for
     from photogram.messages import Message
 
     if job.is_example:
@@ -104,7 +104,7 @@ def absolute_orientation(
     made = documents.inside({TEXT: result.report().encode()})
     made |= documents.pictures(lambda: {"residuals": result.plot()})
     made |= {trace: trace_text(result).encode()} if trace else {}
-    made |= {} if points else documents.as_json(result)
+    made |= {} if points else job.as_json(result.to_json)
     if part_two and result.usable:
         made[part_two] = "\n".join([*transformation_records(result.similarity, ident), ""]).encode()
     if restart_out:
@@ -113,15 +113,12 @@ def absolute_orientation(
     written = list(made)
     with job.outputs() as outputs:
         if points and target:
-            rows = None
-            if documents.json:
-                stations = point_rows(*result.transform_points())
-                rows = Document(documents.json, without_points(result), stations)
             if decimals is None:
                 decimals = decimals_for((result.rms or 0.0) / result.similarity.scale)
             sizes = {"point_sd": point_sd, "decimals": decimals}
-            _transform_file(job, result.similarity, points, target, document=rows, outputs=outputs, **sizes)
-            written = [target, *([documents.json] if documents.json else []), *written]
+            head = (without_points(result), point_rows(*result.transform_points())) if job.json else ()
+            _transform_file(job, result.similarity, points, target, head, outputs=outputs, **sizes)
+            written = [*filter(None, (target, job.json)), *written]
         for path, content in made.items():
             outputs.write(path, content)
     job.conclude(
@@ -142,14 +139,17 @@ def transform(
     decimals: Annotated[int, typer.Option(min=0, max=15)] = 6,
 ) -> None:
     """Transform any number of model points with an earlier orientation (part II)."""
+    from photogram import _photocore
     from photogram.absolute_orientation import read_similarity
     from photogram.absolute_orientation.stations import read_transformation
+    from photogram.io.json import opened
 
     similarity = read_similarity(result, usable=True) if _is_document(result) else read_transformation(result)
     with job.outputs() as outputs:
         sizes = {"point_sd": point_sd, "decimals": decimals}
-        count = _transform_file(job, similarity, points, out, outputs=outputs, **sizes)
-    job.conclude([out], summary=lambda: output.print(f"{count} points"))
+        head = opened({"program": f"photogram {_photocore.__version__}"}, "points")
+        count = _transform_file(job, similarity, points, out, (head,), outputs=outputs, **sizes)
+    job.conclude(filter(None, (out, job.json)), summary=lambda: output.print(f"{count} points"))
 
 
 @with_job("absolute-orientation relative", example=EXAMPLE)
@@ -183,7 +183,7 @@ def relative(
     columns |= dict(zip("xyz", strip.positions.T, strict=True))
     job.finish(
         {out: csv_text(columns)},
-        summary=lambda: print_sections(strip.document(), "OUT"),
+        document=strip.document(),
         code=NOT_USABLE if strip.unchecked else 0 if strip.converged else NOT_CONVERGED,
     )
 
@@ -194,10 +194,14 @@ def _is_document(path: Path) -> bool:
     return any(line.lstrip().startswith("{") for line in read_lines(path)[:1])
 
 
-def _transform_file(job: Job, similarity: Similarity, points: Path, target: Path, **options: Any) -> int:
-    """Transform points, and show on standard error how many are done; return their number."""
+def _transform_file(
+    job: Job, similarity: Similarity, points: Path, target: Path, head: tuple[bytes, ...], **options: Any
+) -> int:
+    """Transform points with a status line, return their number; `head` begins the JSON document."""
     from photogram.absolute_orientation import transform_file
+    from photogram.absolute_orientation.stream import Document
 
+    options["document"] = Document(job.json, *head) if job.json else None
     text = f"transforming {escape(points.name)}"
     with job.status(text) as update:
         progress = None if update is None else lambda done: update(f"{text}: {done} points")

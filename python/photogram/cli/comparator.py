@@ -86,21 +86,18 @@ def comparator(
         if documents.html is not None or (plots and not pdf):
             mark = f"-{number}" if documents.html is not None and several else ""
             files |= own.page(job, replace(one, messages=job.told(one.messages)).document, mark)
-    texts = [one.to_json() for one in calibrations] if documents.json is not None else []
-    json = b"[" + b",\n".join(texts) + b"]\n" if several else b"".join(texts)
     code = worst(calibration.verdict for calibration in calibrations)
+
+    def to_json() -> bytes:
+        texts = [one.to_json() for one in calibrations]
+        return b"[" + b",\n".join(texts) + b"]\n" if several else texts[0]
 
     def summarize() -> None:
         for one in calibrations:
             remarks = [message.text for message in one.messages]
             print_document(one.document(), "listing.txt", "variance", "linear", remarks=remarks)
 
-    job.finish(
-        files,
-        {documents.json: json} if documents.json is not None else {},
-        summary=summarize,
-        code=code,
-    )
+    job.finish(files, job.as_json(to_json), summary=summarize, code=code)
 
 
 def _corrections(calibration: Calibration) -> dict[str, bytes]:
@@ -147,14 +144,18 @@ def correct(
     """
     from photogram.comparator.correction import Correction, correct_table
     from photogram.comparator.grid import read_table
+    from photogram.messages import coded
+    from photogram.show.page import Document
 
     made, remarks = correct_table(
         Correction.read(correction), read_table(measurements), invert=invert, extrapolate=extrapolate
     )
     job.remark(*remarks)
+    document = Document("Corrected measurements", "", members={"messages": coded(remarks)})
     if corrected is None:
         typer.echo(made.decode(), nl=False)
-    job.finish({corrected: made} if corrected else {})
+        job.quiet = True  # Standard output contains the table only
+    job.finish({corrected: made} if corrected else {}, document=document, summary=lambda: None)
 
 
 @with_job("comparator compare", example=(), ending="-compared", example_name="comparator")

@@ -41,7 +41,7 @@ def convert_lens(
     camera: str | None = None,
     fit: LensFit,
     tolerance: float | None = None,
-    documents: Annotated[Documents, Only("out", "json", "plots")],
+    documents: Annotated[Documents, Only("out", "plots")],
 ) -> None:
     """Fit a lens of another model to a camera and report the differences.
 

@@ -30,7 +30,6 @@ class Documents:
     """Options for the forms of a result."""
 
     out: OutputFolder = None
-    json: OutputFile = None
     xlsx: OutputFile = None
     html: OutputFile = None
     no_html: bool = False
@@ -113,10 +112,6 @@ class Documents:
         drawn = {name: plot for name, plot in make().items() if plot is not None}
         ending = self.plot_format
         return self.inside({f"{name}{mark}.{ending}": plot.render(ending) for name, plot in drawn.items()})
-
-    def as_json(self, result: Any, mark: str = "") -> dict[Path, bytes]:
-        """Return the file of `--json FILE`; none without it."""
-        return {} if self.json is None else {self.json.with_stem(self.json.stem + mark): result.to_json()}
 
     def of_network(
         self, job: Job, result: AdjustedNetwork, sizes: Sequence[tuple[float, float] | None]
@@ -201,7 +196,7 @@ class Documents:
             lambda: self.pictures(
                 lambda: {**({} if network is None else network.plot.available()), **plots()}
             ),
-            lambda: self.as_json(result),
+            lambda: job.as_json(result.to_json),
             lambda: {} if network is None else self.of_network(job, network, sizes),
             summary=summarize,
             code=result.verdict.exit if code is None else code,

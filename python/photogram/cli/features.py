@@ -9,7 +9,7 @@ import typer
 from photogram.cli.adjust import result_at
 from photogram.cli.console import print_document
 from photogram.cli.job import Job, with_job
-from photogram.cli.options import Input, OutputFile, OutputFolder, Threads, misuse
+from photogram.cli.options import Input, OutputFolder, Threads, misuse
 from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import dataclass, fields
 
@@ -51,7 +51,6 @@ def features(
     k: Annotated[float, typer.Option("-k", min=0.01)] = 2.0,
     coverage: Annotated[float | None, typer.Option(min=0.01, max=0.999999)] = None,
     out: OutputFolder = None,
-    json: OutputFile = None,
     reading: ReadOptions,
     threads: Threads = None,
     strict: bool = False,
@@ -65,9 +64,7 @@ def features(
     from photogram import features as fitted
     from photogram.formats.results import feature_files
     from photogram.results.features import features_members, features_section
-    from photogram.show.forms import to_json
-    from photogram.show.judgement import judged
-    from photogram.show.page import Document
+    from photogram.show.judgement import verdict_document
 
     definitions = wanted.definitions()
     result, project = result_at(job, path, reading, threads, fitted=False)
@@ -80,10 +77,10 @@ def features(
     found = fitted(result, definitions or declared, k=k, coverage=coverage)
     verdict = result.verdict
     sections, members = [features_section(found)], features_members(found)
-    document = Document("Features", "", [judged(verdict)], verdict.next, [], sections, members)
+    document = verdict_document(verdict, "Features", "", sections=sections, members=members)
     job.finish(
         {} if out is None else {out / name: each for name, each in feature_files(found).items()},
-        {} if json is None else {json: to_json(document)},
+        document=document,
         summary=lambda: print_document(document, "--json FILE", "features"),
         code=verdict.exit_code(strict=strict),
     )

@@ -13,6 +13,7 @@ from photogram.cli.options import Input, OutputFolder, Reads, Threads
 from photogram.cli.projects import read_project
 from photogram.formats.read_options import ReadOptions
 from photogram.lazy_dataclasses import replace
+from photogram.messages import coded
 from photogram.words import phrase
 
 if TYPE_CHECKING:
@@ -56,11 +57,7 @@ def _adjusted(job: Job, path: Path, reading: ReadOptions, interior: str, threads
 
 @with_job("film marks")
 def marks(
-    job: Job,
-    *,
-    path: Annotated[Path, Reads.PROJECT],
-    out: OutputFolder = None,
-    name: str = "1",
+    job: Job, *, path: Annotated[Path, Reads.PROJECT], out: OutputFolder = None, name: str = "1"
 ) -> None:
     """Write tables of the fiducial marks of MicMac, or MicMac files of the marks of a project.
 
@@ -76,17 +73,19 @@ def marks(
     if has_marks(path):
         job.reads(*(each for each in sorted(path.rglob("*")) if each.suffix in (".xml", ".txt")))
         found = read_marks(path)
-        remarks = [*map(str, found.remarks)]
-        files = {f"{table}.csv": csv_text(columns, remarks) for table, columns in found.tables(name).items()}
-        figures = [
-            Fact.of("Marks", len(found.places)),
-            Fact.of("Readings", sum(map(len, found.readings.values()))),
-            Fact.of("Photos", len(found.readings)),
-        ]
-        sections = [remarks_section(remarks)]
-        document = Document("Marks of MicMac", "", highlights=figures, sections=sections)
+        kind, remarks, readings = "Marks of MicMac", found.remarks, found.readings
+        texts = [*map(str, remarks)]
+        files = {f"{table}.csv": csv_text(columns, texts) for table, columns in found.tables(name).items()}
+        counts = {
+            "marks": len(found.places),
+            "readings": sum(map(len, readings.values())),
+            "photos": len(readings),
+        }
     else:
         files = write_marks(read_project(job, path, ReadOptions()))
-        document = Document("For MicMac", "", highlights=[Fact.of("Files", len(files))])
+        kind, remarks, counts = "For MicMac", (), {"files": len(files)}
+    figures = [Fact.of(key.capitalize(), count) for key, count in counts.items()]
+    members = {**counts, "messages": coded(remarks)}
+    document = Document(kind, "", [], [], figures, [remarks_section(remarks)], members)
     written = {} if out is None else {out / file: content for file, content in files.items()}
-    job.finish(written, summary=lambda: print_document(document, "--out DIR", "remarks"))
+    job.finish(written, document=document, summary=lambda: print_document(document, "--json FILE", "remarks"))

@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 
 import typer
 
-from photogram.cli.console import errors, failures, print_remark, print_written
+from photogram.cli.console import errors, failures, print_remark, print_sections, print_written
 from photogram.cli.options import (
+    OutputFile,
     Reads,
     Writes,
     arrange,
@@ -39,8 +40,9 @@ if TYPE_CHECKING:
     from photogram import Progress
     from photogram.io.seals import InputFile
     from photogram.io.writing import Files, OutputSet
-    from photogram.show.page import Section
+    from photogram.show.page import Document, Section
 
+Command = Callable[..., None]
 LARGEST = 2**53  # Largest integer of an option; larger doubles are not exact counts
 
 
@@ -57,6 +59,7 @@ class Job:
         paths: Mapping[Reads | Writes, list[Path]] | None = None,
         name: str = "",
         quiet: bool = False,
+        json: Path | None = None,
         options: Mapping[str, Any] | None = None,
     ) -> None:
         self._began, self._clock = datetime.now(UTC), time.perf_counter()
@@ -68,7 +71,7 @@ class Job:
         self._read = set[Path]()  # All files that are read during the job
         self._resources = ExitStack()
         self._examples: list[Path] = []
-        self.name, self.quiet, self.is_example = name, quiet, False
+        self.name, self.quiet, self.json, self.is_example = name, quiet, json, False
 
     def __enter__(self) -> Job:
         from photogram.io.files import paths_read
@@ -151,10 +154,16 @@ class Job:
     def finish(
         self,
         *results: Files | Callable[[], Files],
+        document: Document | None = None,
         summary: Callable[[], None] | None = None,
         code: int = 0,
     ) -> None:
-        """Write the results, print a summary, and end with an exit code."""
+        """Write results and the JSON of a document, print a summary or the document, and exit with a code."""
+        if document is not None:
+            from photogram.show.forms import to_json
+
+            results = (*results, self.as_json(partial(to_json, document)))
+            summary = summary or partial(print_sections, document, "--json FILE")
         self.conclude(self.write(*results), summary=summary, code=code)
 
     def conclude(
@@ -167,6 +176,10 @@ class Job:
             print_written(written)
         if code:
             raise typer.Exit(code)
+
+    def as_json(self, make: Callable[[], bytes], mark: str = "") -> dict[Path, bytes]:
+        """Return the file of `--json FILE`; none without it."""
+        return {} if self.json is None else {self.json.with_stem(self.json.stem + mark): make()}
 
     def input_files(self) -> tuple[list[InputFile], int]:
         """Return the first files that were read, with checksums, and the number of the others."""
@@ -327,11 +340,13 @@ def with_job(
     example: Sequence[str] | None = None,
     ending: str = "",
     example_name: str = "example",
-) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    json: bool = True,
+) -> Callable[[Command], Command]:
     """Return a decorator that runs a command inside a :class:`Job`, its parameter `job`.
 
     The fields of a parameter that is a dataclass are options; marks :class:`Without`, :class:`Only` and
-    :class:`Changes` select some of them. Each command has the option `--quiet`.
+    :class:`Changes` select some of them. Each command has the option `--quiet`, and `--json FILE`, which
+    :meth:`Job.finish` or :meth:`Job.as_json` writes.
 
     Parameters
     ----------
@@ -344,22 +359,27 @@ def with_job(
         Ending of the default of `out`, after the name of the first argument; empty: without default.
     example_name
         Name of the example in this default.
+    json
+        False for a command whose complete result is in its other files: without `--json`.
     """
-    return partial(_with_job, name=name, example=example, ending=ending, example_name=example_name)
+    return partial(_with_job, name=name, example=example, ending=ending, example_name=example_name, json=json)
 
 
 def _with_job(
-    command: Callable[..., None], *, name: str, example: Sequence[str] | None, ending: str, example_name: str
-) -> Callable[..., None]:
+    command: Command, *, name: str, example: Sequence[str] | None, ending: str, example_name: str, json: bool
+) -> Command:
     own, classes = options_of(command)
-    marked = roles(command)
+    marked = {**roles(command), "json": Writes.FILE}
     first, several = own[0].name, "list" in str(own[0].annotation)
     if example is not None:
         own = [_optional(parameter) for parameter in own]
         option = Parameter("example", Parameter.KEYWORD_ONLY, default=False, annotation=bool)
         own.insert(1, declared(option, command.__name__))
-    quiet = Annotated[bool, typer.Option("--quiet", "-q")]
-    own.append(declared(Parameter("quiet", Parameter.KEYWORD_ONLY, default=False, annotation=quiet), "Job"))
+    more: dict[str, Any] = {"json": (None, OutputFile)} if json else {}
+    more["quiet"] = False, Annotated[bool, typer.Option("--quiet", "-q")]
+    for option_of_all, (default, kind) in more.items():
+        parameter = Parameter(option_of_all, Parameter.KEYWORD_ONLY, default=default, annotation=kind)
+        own.append(declared(parameter, command.__name__))
 
     @wraps(command)
     def run(**values: Any) -> None:
@@ -374,8 +394,9 @@ def _with_job(
             value = values.get(path_name)
             several_paths = value if isinstance(value, list) else [value]
             paths[role] += [Path(path) for path in several_paths if path is not None]
-        given, is_quiet = given_options(own, values), values.pop("quiet", False)
-        with Job(paths=paths, name=name, options=given, quiet=is_quiet) as job:
+        given = given_options(own, values)
+        of_job = {"quiet": values.pop("quiet", False), "json": values.pop("json", None)}
+        with Job(paths=paths, name=name, options=given, **of_job) as job:
             if values.pop("example", False):
                 job.is_example = True
                 if example:

@@ -49,7 +49,7 @@ def perspective_center(
             print_remark(message)
 
     job.finish(
-        documents.as_json(run),
+        job.as_json(run.to_json),
         documents.inside({"listing.txt": listing(run).encode()} if results or not stopped else {}),
         documents.pictures(lambda: {"residuals": run_sketch(run.results)}),
         documents.page(job, run.document) if results else {},

@@ -99,7 +99,7 @@ def _hint(names: Iterable[str]) -> str:
     return ", ".join(f"--{name.replace('_', '-')}" for name in sorted(names))
 
 
-@with_job("simulate")
+@with_job("simulate", json=False)
 def simulate(
     job: Job,
     *,

@@ -5,25 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from photogram.cli.console import print_sections
 from photogram.cli.job import Job, with_job
 from photogram.cli.options import Input, OutputFile, Reads, Writes
 from photogram.cli.projects import EXAMPLE, read_project
 from photogram.formats.read_options import ReadOptions
-from photogram.messages import listed
+from photogram.messages import coded, listed
 from photogram.words import phrase
 
 CLASSES = {"h": "horizontal", "v": "vertical", "3d": "3D"}
 
 
 @with_job("info", example=EXAMPLE)
-def info(
-    job: Job,
-    *,
-    path: Input,
-    json: OutputFile = None,
-    reading: ReadOptions,
-) -> None:
+def info(job: Job, *, path: Input, reading: ReadOptions) -> None:
     """Describe a project without adjustment: sizes, cameras, rays, units, frame, missing data.
 
     If the project requests an accuracy statement, the command describes the subject of the statement.
@@ -31,7 +24,6 @@ def info(
     from photogram.formats.description import described
     from photogram.results.statement.request import Asked
     from photogram.results.statement.texts import Texts
-    from photogram.show.forms import to_json
     from photogram.show.page import Fact, Facts, Section
 
     project = read_project(job, path, reading)
@@ -56,10 +48,7 @@ def info(
         }
         document = document.with_sections(Section("statement", "Accuracy statement", [Facts("", facts)]))
         document = document.with_members(lambda: {"statement": members})
-    job.finish(
-        {} if json is None else {json: to_json(document)},
-        summary=lambda: print_sections(document, "--json FILE"),
-    )
+    job.finish(document=document)
 
 
 @with_job("convert", example=EXAMPLE)
@@ -72,18 +61,22 @@ def convert(
     reading: ReadOptions,
 ) -> None:
     """Write a project in another format and list the data that the format cannot contain."""
-    from photogram.formats import cannot_hold, target
+    from photogram.formats import target
     from photogram.formats.description import described
+    from photogram.formats.registry import losses
     from photogram.show.page import Remarks, Section, Text
 
     chosen = target(out, to)
     project = read_project(job, path, reading)
-    lost = cannot_hold(project, chosen.format.name)
+    lost = losses(project, chosen.format.name)
+    sentences = [*map(str, lost)] or ["nothing"]
     document = described(project).with_sections(
         Section("written", "Written", [Text(f"{out}: {chosen.format.title} (--to {chosen.format.name})")]),
-        Section("lost", "Lost, as the format has no place for it", [Remarks(lost or ["nothing"])]),
+        Section("lost", "Lost, as the format has no place for it", [Remarks(sentences)]),
     )
-    job.finish(chosen.files(project), summary=lambda: print_sections(document, "`photogram info`"))
+    written = {"path": str(out), "format": chosen.format.name}
+    document = document.with_members(lambda: {"written": written, "lost": coded(lost)})
+    job.finish(chosen.files(project), document=document)
 
 
 @with_job("metadata")
@@ -108,7 +101,7 @@ def metadata(
     found = read_metadata(path, mrk_antenna=mrk_antenna)
     job.reads(*found.tables)
     files = {} if out is None else gnss_files(found, out, photos_crs, given.get("gnss"))
-    job.finish(files, summary=lambda: print_sections(found.document(), "--out FILE"))
+    job.finish(files, document=found.document())
 
 
 Kind = Literal["block", "metrology", "survey", "rolling", "archive", "night", "board"]
@@ -125,7 +118,7 @@ SOURCES = {
 """Packaged examples, directories of photogram.examples."""
 
 
-@with_job("new")
+@with_job("new", json=False)
 def new(
     job: Job,
     out: Annotated[Path, Writes.DIRECTORY],

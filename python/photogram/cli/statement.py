@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from photogram.formats import Project
 
 
-@with_job("statement", example=("survey",), ending="-statement")
+@with_job("statement", example=("survey",), ending="-statement", json=False)
 def statement(
     job: Job,
     *,

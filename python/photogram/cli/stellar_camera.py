@@ -70,7 +70,7 @@ def stellar_camera(
         files |= documents.unless_withheld(cameras, withheld, usable=result.verdict.usable)
         files |= documents.pictures(document.plots, mark)
         files |= documents.page(job, result.document, mark)
-        asked |= documents.as_json(result, mark)
+        asked |= job.as_json(result.to_json, mark)
     code = worst((result.verdict for result, _ in results), strict=strict)
 
     def summarize() -> None:
@@ -153,16 +153,15 @@ def places(
     annual aberration, precession and nutation (IAU 2006/2000A). OUT has star, ra_rad, dec_rad, magnitude.
     """
     from photogram.io.csv_text import csv_text
+    from photogram.show.page import Document
     from photogram.stellar.catalogue import Catalogue
     from photogram.stellar.places import apparent_places
 
     found = Catalogue.read(catalogue, epoch) if catalogue else Catalogue.hipparcos()
     stars = found.brighter(faintest)
     right, declination = apparent_places(stars, utc).T
-    columns = {
-        "star": list(stars.ids),
-        "ra_rad": right,
-        "dec_rad": declination,
-        "magnitude": stars.magnitudes,
-    }
-    job.finish({out: csv_text(columns)}, summary=lambda: output.print(f"{len(stars.ids)} stars at {utc}"))
+    names, count = list(stars.ids), len(stars.ids)
+    columns = {"star": names, "ra_rad": right, "dec_rad": declination, "magnitude": stars.magnitudes}
+    made = Document("Apparent places", "", members={"utc": utc, "stars": count})
+    summary = f"{count} stars at {utc}"
+    job.finish({out: csv_text(columns)}, document=made, summary=lambda: output.print(summary))
