@@ -75,12 +75,7 @@ def read_storage(path: Path, board: Board | None) -> Measured:
     return _measured(path, xy, board, sizes)
 
 
-def _measured(
-    path: Path,
-    xy: Floats,
-    board: Board | None,
-    sizes: dict[str, tuple[int, int]],
-) -> Measured:
+def _measured(path: Path, xy: Floats, board: Board | None, sizes: dict[str, tuple[int, int]]) -> Measured:
     views, points = xy.shape[:2]
     if board is not None and len(board.places) != points:
         fields = {"points": points, "count": len(board.places), "board": board.described}
@@ -111,15 +106,9 @@ def _matrix(tree: Tree) -> Floats:
     given = data.value if isinstance(data.value, list) else None
     if given is None or len(given) != rows * cols * channels:
         raise data.error(phrase("targets.matrix", what=f"{rows} x {cols} x {channels} numbers"))
-    numbers = np.array([_coordinate(each) for each in data])
-    return numbers.reshape((rows, cols, channels) if channels > 1 else (rows, cols))
-
-
-def _coordinate(tree: Tree) -> float:
-    """Return a finite number, or NaN in OpenCV spelling for a missing corner."""
-    value = tree.value
-    missing = value.lower() in (".nan", "nan") if isinstance(value, str) else value != value
-    return np.nan if missing else tree.number()
+    missing = (".nan", "nan")  # Spellings of OpenCV
+    numbers = [np.nan if str(each.value).lower() in missing else each.number() for each in data]
+    return np.reshape(numbers, (rows, cols, channels) if channels > 1 else (rows, cols))
 
 
 def _xml(path: Path) -> dict[str, Any]:
@@ -240,6 +229,6 @@ def read_arrays(path: Path, data: bytes) -> Arrays:
                     message = phrase("targets.array-damaged", name=name, reason=str(error))
                     raise InputError(message, file=path) from None
     except UNPACKABLE as error:
-        message = phrase("error.parse", format="archive of arrays (npz)", reason=str(error))
+        message = phrase("error.parse", format="npz", reason=str(error))
         raise InputError(message, file=path) from None
     return Arrays(path, arrays)
