@@ -106,8 +106,7 @@ def _matrix(tree: Tree) -> Floats:
     given = data.value if isinstance(data.value, list) else None
     if given is None or len(given) != rows * cols * channels:
         raise data.error(phrase("targets.matrix", what=f"{rows} x {cols} x {channels} numbers"))
-    missing = (".nan", "nan")  # Spellings of OpenCV
-    numbers = [np.nan if str(each.value).lower() in missing else each.number() for each in data]
+    numbers = [np.nan if str(each.value).lower() in (".nan", "nan") else each.number() for each in data]
     return np.reshape(numbers, (rows, cols, channels) if channels > 1 else (rows, cols))
 
 
