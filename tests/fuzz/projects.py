@@ -22,6 +22,7 @@ from photogram.distributed import Division
 from photogram.formats import ReadOptions
 from photogram.formats.images import to_corner
 from photogram.formats.supplements import self_calibrated, with_control
+from photogram.io.places import Place, at_place
 
 from .networks import random_network
 
@@ -184,7 +185,8 @@ def _adjusted(
     if control is not None:
         project = with_control(project, control, sd, crs)
     if calibrated:
-        project = self_calibrated(project, calibrated.split(","))
+        with at_place(Place(), "--self-calibrate"):
+            project = self_calibrated(project, calibrated.split(","))
     block = project.block
     if not np.isfinite(block.photo_positions).all():
         block = photogram.first_values(block).block
