@@ -61,11 +61,9 @@ def read_storage(path: Path, board: Board | None) -> Measured:
         sizes[""] = content["image_width"].whole(1), content["image_height"].whole(1)
     grid = _matrix(content["grid_points"]) if "grid_points" in content else None
     if board is None and all(key in content for key in ("board_width", "board_height", "square_size")):
-        board = Board(
-            columns=content["board_width"].whole(),
-            rows=content["board_height"].whole(),
-            spacing=content["square_size"].number(),
-        )
+        columns, rows = content["board_width"].whole(), content["board_height"].whole()
+        with at_place(Place(path)):
+            board = Board(columns=columns, rows=rows, spacing=content["square_size"].number())
         if grid is not None:
             places, points = grid.reshape(-1, grid.shape[-1]), content["grid_points"]
             if places.shape != board.places.shape:
