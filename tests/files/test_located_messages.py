@@ -15,7 +15,7 @@ from photogram import InputError, formats
 from photogram.absolute_orientation import read_csv, read_similarity
 from photogram.absolute_orientation.stations import read_transformation
 from photogram.arguments.arrays import matrix_fault, shaped
-from photogram.comparator.correction import Correction
+from photogram.comparator import Correction
 from photogram.io.json import read_json
 from photogram.io.numbers import whole_number
 from photogram.io.parquet import read_sheet

@@ -18,11 +18,12 @@ import photogram
 from photogram import Block, formats
 from photogram.adjustment.options import CurrentVariance
 from photogram.cli import adjust as adjusting
+from photogram.comparator import Place
 from photogram.distributed import Division
 from photogram.formats import ReadOptions
 from photogram.formats.images import to_corner
 from photogram.formats.supplements import self_calibrated, with_control
-from photogram.io.places import Place, at_place
+from photogram.io.places import at_place
 
 from .networks import random_network
 
