@@ -226,6 +226,6 @@ def read_arrays(path: Path, data: bytes) -> Arrays:
                     message = phrase("targets.array-damaged", name=name, reason=str(error))
                     raise InputError(message, file=path) from None
     except UNPACKABLE as error:
-        message = phrase("error.parse", format="npz", reason=str(error))
+        message = phrase("error.parse", format="as an archive of arrays (npz)", reason=str(error))
         raise InputError(message, file=path) from None
     return Arrays(path, arrays)
