@@ -65,11 +65,11 @@ SPOILT = {
     "point sd too few": (replace("point_sd", lambda a: a[1:]), r"point_sd: must have the shape"),
     "words for numbers": (
         replace("image_xy", lambda a: [["one", "two"]] * len(a)),
-        "image_xy: must be an array of numbers",
+        r"image_xy\[0\]\[0\]: must be a number",
     ),
     "ragged": (
         replace("photo_positions", lambda a: [[1.0, 2.0], [3.0]]),
-        "photo_positions: must be an array of numbers",
+        r"photo_positions\[1\]: must have 2 values, got 1",
     ),
     "photo at infinity": (
         set_at("photo_positions", (2, 1), math.inf),

@@ -87,6 +87,13 @@ def test_version_and_usage(run):
         assert run(*arguments).exit_code == 2
 
 
+def test_the_package_is_the_command():
+    done = subprocess.run(
+        [sys.executable, "-m", "photogram", "adjust", "nowhere"], capture_output=True, check=False
+    )
+    assert (done.returncode, b"nowhere" in done.stderr) == (1, True)
+
+
 # giant
 
 

@@ -24,6 +24,7 @@ PROGRAMS = (
     "film",
 )
 FLOORS = (
+    ("__main__",),
     ("cli",),
     ("formats",),
     PROGRAMS,

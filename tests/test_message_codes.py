@@ -40,6 +40,7 @@ def test_forms_of_fields():
         "a.parts": "before{parts:+;}", "a.capital": "{name:^}",
         "a.named": "{n:the point {names}/{n} points in {files} {files:file/files}}",
         "a.counted": "{n} {n:point is/points are} missing",
+        "a.listed": "the {names:point/points} {names}",
     })  # fmt: skip
     assert own("a.number", n=2 / 3) == "0.667"
     assert own("a.list", names=["A", "B", "C"]) == "A, B and 1 more"
@@ -50,6 +51,8 @@ def test_forms_of_fields():
     assert own("a.capital", name=Phrase("named.photo", {"photo": "3"})) == "Photo 3"
     assert own("a.named", n=1, files=1, names=["A"]) == "the point A"
     assert own("a.named", n=2, files=3, names=["A", "B"]) == "2 points in 3 files"
+    assert own("a.listed", names=["A"]) == "the point A"
+    assert own("a.listed", names=["A", "B"]) == "the points A, B"
     assert own("a.counted", n=1) == "1 point is missing"
     assert own("a.counted", n=2) == "2 points are missing"
     assert Words("de")("part.factor", factor=1.5, low=1.25, high=2.0) == "1,5 (95 Prozent: 1,25 bis 2)"

@@ -62,7 +62,7 @@ def test_all_coordinates_too_large_are_named():
 def test_a_standard_deviation_below_rounding_is_refused_and_zero_is_not():
     sds = BLOCK.photo_position_sd.copy()
     sds[0] = 1e-20
-    with pytest.raises(AdjustmentError, match="photos 0101 must"):
+    with pytest.raises(AdjustmentError, match="photo 0101 must"):
         adjust(BLOCK.replace(photo_position_sd=sds))
     control = np.isfinite(BLOCK.point_sd)
     with pytest.raises(AdjustmentError, match="points C"):

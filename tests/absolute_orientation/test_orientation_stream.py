@@ -173,7 +173,7 @@ def test_files_that_cannot_be_read(oriented, tmp_path):
         transform_file(oriented.similarity, tmp_path / "latin.csv", tmp_path / "out.csv")
     for text in ("{", '{"scale": 1}', "[]"):
         (tmp_path / "bad.json").write_text(text)
-        with pytest.raises(InputError, match="the document must describe a result"):
+        with pytest.raises(InputError, check=coded("error.parse" if text == "{" else "error.content")):
             read_similarity(tmp_path / "bad.json")
 
 

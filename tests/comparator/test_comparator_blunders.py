@@ -286,8 +286,11 @@ def test_missing_members_and_other_documents(tmp_path):
         Correction.read(path)
     for text in ("", "[]", "3", '{"scale_x": NaN}', '{"correction": 5}', "[" * 100_000):
         path.write_text(text)
-        with pytest.raises(InputError, match="the document must describe a correction"):
+        with pytest.raises(InputError) as raised:
             Correction.read(path)
+        valid = text in ("[]", "3", '{"correction": 5}')
+        assert raised.value.code == ("error.content" if valid else "error.parse")
+        assert (raised.value.file, raised.value.record) == (path, None if valid else 1)
 
 
 @pytest.mark.parametrize("member", ["coefficients_x_um", "half_range_um"])

@@ -186,7 +186,7 @@ def test_feature_02_plates_from_files(tmp_path):
     assert again.xy_um == pytest.approx(grid.xy_um)
     assert find_grid("778").number == 778
     path.write_text("point,x_um,y_um\n1,0,0\n1,5,5\n")
-    with refusal("plate=0", "error.repeated kind=point name=1"):
+    with refusal("error.repeated kind=point name=1", record=3):
         read_grid(path)
     path.write_text("# sigma = 0.2\npoint,x_um,y_um\n1,0,0\n")
     with refusal("error.unknown.close kind=setting name=sigma close=sigma_um"):

@@ -161,7 +161,7 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
         (
             "survey_common_sd = 0.004",
             "survey_common_sd = -0.004",
-            "error.key check survey_common_sd: error.at survey_common_sd: request.deviations",
+            "error.key check survey_common_sd: request.deviations",
         ),
         (
             "survey_common_sd = 0.004",
@@ -174,7 +174,7 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
             "error.key check survey_common_sd: error.count 2: toml.or 1,3",
         ),
         ("in_control = true", "in_control = 1", "error.key check survey_common_in_control: error.flag 1"),
-        ('"same-base"', '"perhaps"', "error.key check independent: error.at independent: error.choice"),
+        ('"same-base"', '"perhaps"', "error.key check independent: error.choice"),
         (
             'independent = "same-base"',
             "independent = true",
@@ -230,7 +230,7 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
         (
             'language = "de"',
             'language = "fr"',
-            "error.key statement language: error.at language: error.choice",
+            "error.key statement language: error.choice",
         ),
         ('text = "firm.toml"', 'text = "film.toml"', "error.key statement text: error.absent file"),
         ('text = "firm.toml"', f'text = "{"x" * 300}"', "error.key statement text: error.absent file"),
@@ -242,7 +242,7 @@ def test_reasons_may_stand_in_a_section_of_their_own(project):
         (
             "coverage = 0.9",
             "coverage = 90",
-            "error.key statement coverage: error.at coverage: error.range 90.0 0 1",
+            "error.key statement coverage: error.range 90.0 0 1",
         ),
         ("coverage = 0.9", 'coverage = "90 %"', "error.key statement coverage: error.number 90 %"),
         ('firm = "Verm', 'firma = "Verm', "error.at [statement]: error.unknown.close key firma firm"),

@@ -13,7 +13,7 @@ from shutil import rmtree
 import orjson
 import typer
 
-from photogram import AdjustmentError, PhotogramError
+from photogram import AdjustmentError, InputError, PhotogramError
 
 from .damage import damaged
 from .programs import PROGRAMS, Watch, unsound
@@ -30,6 +30,8 @@ ENDINGS = (
     "failed",
 )
 """How an input ends."""
+WITHOUT_FILES = ("simulate",)
+"""Formats whose inputs are options of the Python interface."""
 _FORMATS = list(PROGRAMS)
 _WEIGHTS = [often for _, often in PROGRAMS.values()]
 
@@ -132,7 +134,7 @@ class Fuzzer:
         except AdjustmentError:
             return "refused by the adjustment", None, None
         except PhotogramError as error:
-            return "refused as input", None if str(error).strip() else "an error without a message", None
+            return "refused as input", self._silent(kind, error), None
         except typer.Exit as leaving:
             if leaving.exit_code == 3:
                 return "not converged", None, []
@@ -153,6 +155,18 @@ class Fuzzer:
                 raise
             return "failed", traceback.format_exc(), None
         return "converged", None, written
+
+    def _silent(self, kind: str, error: PhotogramError) -> str | None:
+        """Return what the message of a refusal lacks: a sentence, or the file or option that is wrong.
+
+        After reading, errors of the Python interface concern the block, and name photos, points or cameras.
+        """
+        message = str(error).strip()
+        if not message:
+            return "an error without a message"
+        known = not isinstance(error, InputError) or error.file is not None or message.startswith("--")
+        is_reading = not (self.watch and self.watch.reached) and kind not in WITHOUT_FILES
+        return f"a message without file or option: {message}" if is_reading and not known else None
 
     def _left(self, files: Files, ending: str, written: list[str] | None) -> str | None:
         """Look at the files: inputs are as they were; outputs are whole, or there are none."""

@@ -18,10 +18,12 @@ import photogram
 from photogram import Block, formats
 from photogram.adjustment.options import CurrentVariance
 from photogram.cli import adjust as adjusting
+from photogram.comparator import Place
 from photogram.distributed import Division
 from photogram.formats import ReadOptions
 from photogram.formats.images import to_corner
 from photogram.formats.supplements import self_calibrated, with_control
+from photogram.io.places import at_place
 
 from .networks import random_network
 
@@ -184,7 +186,8 @@ def _adjusted(
     if control is not None:
         project = with_control(project, control, sd, crs)
     if calibrated:
-        project = self_calibrated(project, calibrated.split(","))
+        with at_place(Place(), "--self-calibrate"):
+            project = self_calibrated(project, calibrated.split(","))
     block = project.block
     if not np.isfinite(block.photo_positions).all():
         block = photogram.first_values(block).block

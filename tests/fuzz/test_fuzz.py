@@ -16,6 +16,7 @@ from fuzz.damage import damaged
 from fuzz.page import write_section
 from fuzz.programs import PROGRAMS
 from fuzz.sound import SOUND
+from photogram import AdjustmentError, InputError
 
 ROOT = Path(__file__).parents[2]
 INPUTS = 700
@@ -148,6 +149,24 @@ def test_faults_are_seen(tmp_path, monkeypatch):
     assert "left behind" in judged(leaves).fault
     assert "is missing" in judged(lambda place, rng, quiet: ["result.json"]).fault
     assert judged(lambda place, rng, quiet: []).fault is None
+
+
+@pytest.mark.parametrize(
+    ("format", "reached", "error", "lacks"),
+    [
+        ("GIANT project", False, InputError("wrong"), "a message without file or option: wrong"),
+        ("GIANT project", False, InputError("wrong", file=Path("COMMON")), None),
+        ("GIANT project", False, InputError("--crs: wrong"), None),
+        ("GIANT project", False, AdjustmentError("wrong"), None),
+        ("GIANT project", True, InputError("wrong"), None),
+        ("simulate", False, InputError("wrong"), None),
+        ("simulate", True, AdjustmentError(" "), "an error without a message"),
+    ],
+)
+def test_a_message_names_what_is_wrong(tmp_path, format, reached, error, lacks):  # noqa: A002
+    fuzzer = Fuzzer(0, tmp_path)
+    fuzzer.watch = type("Watch", (), {"reached": reached})()
+    assert fuzzer._silent(format, error) == lacks
 
 
 def test_the_section_of_a_page_is_replaced(tmp_path):

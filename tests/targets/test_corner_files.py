@@ -251,7 +251,7 @@ def test_arrays_of_python_objects_are_not_unpickled(tmp_path):
     with refusal("targets.array-damaged name=imgpoints reason=Object arrays cannot be loaded"):
         read_npz(path, None)
     path.write_bytes(b"PK\x03\x04 no archive")
-    with refusal("error.parse format=archive of arrays (npz) reason=File is not a zip file"):
+    with refusal("error.parse format=as an archive of arrays (npz) reason=File is not a zip file"):
         read_npz(path, None)
 
 
@@ -300,7 +300,7 @@ def test_a_model_of_mrcal_with_damaged_arrays_is_refused(tmp_path):
     text = shared("targets", MODEL).read_text()
     amid = len(text) // 2
     path.write_text(text[:amid] + ("A" if text[amid] != "A" else "B") + text[amid + 1 :])
-    with refusal("error.parse format=archive of arrays (npz) reason=Bad CRC-32 for file"):
+    with refusal("error.parse format=as an archive of arrays (npz) reason=Bad CRC-32 for file"):
         read_model(path)
 
 

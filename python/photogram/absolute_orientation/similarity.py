@@ -6,21 +6,17 @@ from pathlib import Path
 from typing import Self
 
 import numpy as np
-import orjson
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import is_covariance, number, numbers, shaped, truth_value
+from photogram.arguments.arrays import matrix_fault, number, numbers, shaped, truth_value
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.io import json
-from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass, replace
-from photogram.network.geometry import rotation_angles
+from photogram.network.geometry import rotation_angles, rotation_fault
 from photogram.words import phrase
-
-ORTHOGONAL = 1e-6  # Largest element of A A^T - I of a matrix read from a file
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,10 +98,8 @@ class Similarity:
         a, b = shaped("rotation", rotation, (3, 3)), shaped("translation", translation, (3,))
         scale = number("scale", scale, "positive")
         deviation_factor = number("deviation_factor", deviation_factor, "positive")
-        if not (
-            np.abs(a).max() < 2 and np.abs(a @ a.T - np.eye(3)).max() < ORTHOGONAL and np.linalg.det(a) > 0
-        ):
-            raise InputError(phrase("orientation.rotation"))
+        if reason := rotation_fault(a):
+            raise InputError(phrase("orientation.rotation", reason=reason))
         centre, model = (
             shaped(name, value, (3,))
             for name, value in (("control_centre", control_centre), ("model_centre", model_centre))
@@ -115,16 +109,16 @@ class Similarity:
         if not np.isfinite(shift).all():
             raise InputError(phrase("orientation.finite"))
         made = cls(scale, a, centre, model, shift, None, deviation_factor)
-        return made if covariance is None else made._with_covariance(covariance)
-
-    def _with_covariance(self, covariance: ArrayLike) -> Self:
+        if covariance is None:
+            return made
         given = shaped("covariance", covariance, (7, 7))
         with np.errstate(all="ignore"):
-            back = np.linalg.inv(self.parameter_partials)
+            back = np.linalg.inv(made.parameter_partials)
             tangent: Floats = back @ given @ back.T
-        if not (is_covariance(given, singular=True) and np.isfinite(tangent).all()):
-            raise InputError(phrase("orientation.covariance"))
-        return replace(self, tangent_covariance=tangent)
+        fault = matrix_fault(given, singular=True)
+        if fault or not np.isfinite(tangent).all():
+            raise InputError(phrase("orientation.covariance", reason=fault.fields["reason"] if fault else ""))
+        return replace(made, tangent_covariance=tangent)
 
     @property
     def translation(self) -> Floats:
@@ -221,7 +215,7 @@ def read_similarity(path: Path, *, usable: bool = False) -> Similarity:
     truth_value("usable", usable)
     path = path_of("path", path)
     with json.holding("result of an absolute orientation", path):
-        found = orjson.loads(read_bytes(path))
+        found = json.read_json(path).value
         is_refused, centres = usable and not found["usable"], found["centres"]
         reasons = ([*map(str, found["messages"])] or [found["status"]]) if is_refused else []
         covariance = found["covariance"]

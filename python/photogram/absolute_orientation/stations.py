@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Container
+from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
@@ -108,7 +108,7 @@ class Stations(Brief):
         control_sd = [
             table[name].fillna(0.0) if name in table else 0.0 * table["x"] for name in CONTROL_SD_COLUMNS
         ]
-        weighted = _weighted(table)
+        weighted = _weighted([*map(str, table)])
         return cls(
             table["id"],
             table[list(CONTROL_COLUMNS)],
@@ -171,9 +171,9 @@ def header(place: Place) -> list[str]:
     return [SPELLINGS.get(cell, cell) for cell in cells(place)]
 
 
-def _weighted(table: Container[str]) -> bool:
-    """Return whether a table has the columns `sd_x`, `sd_y`, `sd_z`; InputError: if some are missing."""
-    names = [name for name in MODEL_SD_COLUMNS if name in table]
+def _weighted(columns: Collection[str]) -> bool:
+    """Return whether there are the columns `sd_x`, `sd_y`, `sd_z`; InputError: if some are missing."""
+    names = [name for name in MODEL_SD_COLUMNS if name in columns]
     if names and len(names) < 3:
         raise InputError(phrase("orientation.incomplete-sd", names=names))
     return bool(names)
@@ -208,7 +208,7 @@ def read_csv(path: Path, *, ground_unit: str = "ground unit", model_unit: str = 
         if known.setdefault(name, row) != row:
             raise table.error(row, phrase("orientation.repeated", station=name))
     with at_place(table.head):
-        weighted = _weighted(table)
+        weighted = _weighted(table.columns)
     control, model = table.vectors(CONTROL_COLUMNS), table.given(MODEL_COLUMNS)
     control_sd = table.vectors(CONTROL_SD_COLUMNS, 0.0, infinite=True)
     model_sd = table.given(MODEL_SD_COLUMNS) if weighted else None

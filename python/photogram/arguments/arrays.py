@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from photogram.arguments.objects import argument_error as argument_error
 from photogram.arguments.objects import value_field as value_field
 from photogram.errors import InputError
-from photogram.words import phrase
+from photogram.words import Phrase, phrase
 
 LARGEST_SD = math.sqrt(sys.float_info.max)  # Larger standard deviations have an infinite variance
 _SYMMETRIC = 1e-9  # Largest asymmetry of a covariance matrix, relative to its diagonal
@@ -86,11 +86,9 @@ def _rule_error(name: str, rule: str, value: float) -> InputError:
 def numbers(name: str, value: ArrayLike, *, missing: bool = False) -> NDArray[np.float64]:
     """Return an array of numbers of any shape, possibly the caller's array."""
     array = _array(name, value, "numbers")
-    kind, wrong = array.dtype.kind, None
-    if kind == "O":
-        wrong = next((each for each in array.flat if not _is_real(each)), None)
-    if kind not in "fiuO" or wrong is not None:
-        raise _no_array(name, "numbers", value if wrong is None else wrong)
+    kind = array.dtype.kind
+    if kind not in "fiuO" or (kind == "O" and not all(map(_is_real, array.flat))):
+        raise _no_array(name, "numbers", array.tolist() if kind == "O" else value)
     try:
         with np.errstate(over="ignore"):  # Infinite values are left to the caller
             found: NDArray[np.float64] = array.astype(np.float64, copy=False)
@@ -128,7 +126,23 @@ def _array(name: str, value: ArrayLike, of: str) -> NDArray[Any]:
 def _no_array(name: str, of: str, value: object) -> InputError:
     if isinstance(value, np.ndarray) and value.ndim:
         value = phrase("error.object", type=f"array of {value.dtype}")
-    return argument_error(name, "array", of=of, value=value)
+    part = _wrong_part(name, value, 3) if of == "numbers" and isinstance(value, list | tuple) else None
+    return part or argument_error(name, "array", of=of, value=value)
+
+
+def _wrong_part(name: str, value: Any, depth: int) -> InputError | None:
+    """Return the error of the first element that is no number, or of the first row of another size."""
+    if not isinstance(value, list | tuple) or not depth:
+        return None if _is_real(value) else argument_error(name, "number", value=value)
+    sizes = [len(row) if isinstance(row, list | tuple) else None for row in value]
+    usual = max(sizes, key=sizes.count, default=None)
+    for place, (row, size) in enumerate(zip(value, sizes, strict=True)):
+        code = "list" if size is None else "number" if usual is None else "count"
+        if size != usual:
+            return argument_error(f"{name}[{place}]", code, value=row, count=usual, actual=size)
+        if wrong := _wrong_part(f"{name}[{place}]", row, depth - 1):
+            return wrong
+    return None
 
 
 def elements(
@@ -312,6 +326,28 @@ def is_covariance(matrices: NDArray[np.float64], *, singular: bool = False) -> N
     correlations = np.where(good[..., np.newaxis, np.newaxis], correlations, np.eye(variances.shape[-1]))
     smallest = np.linalg.eigvalsh(correlations).min(axis=-1, initial=1.0)
     return np.asarray(good & (smallest > (-_ROUNDING if singular else 0.0)))
+
+
+def matrix_fault(matrix: NDArray[np.float64], *, singular: bool = False) -> Phrase | None:
+    """Return the fault of a (k, k) matrix, with its first wrong elements; None for a covariance matrix."""
+    if is_covariance(matrix, singular=singular):
+        return None
+    with np.errstate(all="ignore"):
+        variances = np.diagonal(matrix)
+        limits = np.sqrt(np.abs(np.outer(variances, variances)))
+        wrong = (matrix != matrix.T) & ~(np.abs(matrix - matrix.T) <= _ROUNDING * limits)
+        wrong |= ~(np.abs(matrix) <= (1 + _ROUNDING) * limits) | np.diag(variances < 0)
+    elements = [
+        phrase(
+            "error.elements",
+            n=1 + (i != j),
+            row=i,
+            column=j,
+            values=matrix[[i, j], [j, i]][: 1 + (i != j)].tolist(),
+        )
+        for i, j in np.argwhere(wrong)[:1].tolist()
+    ]
+    return phrase(f"error.covariance{'-singular' * singular}", reason=elements)
 
 
 def chosen(which: NDArray[np.bool_]) -> NDArray[np.bool_] | slice:

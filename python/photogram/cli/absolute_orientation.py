@@ -68,6 +68,8 @@ def absolute_orientation(
         transformation_records,
     )
     from photogram.absolute_orientation.stream import decimals_for
+    from photogram.arguments.arrays import number
+    from photogram.io.places import Place, at_place
     from photogram.messages import Message
 
     if job.is_example:
@@ -86,16 +88,12 @@ def absolute_orientation(
     if restart:
         own = _is_document(restart)
         former = read_similarity(restart) if own else read_restart(restart, deck.stations, deck.messages)
-    result = orient(
-        deck.stations,
-        method=method,
-        start=start,
-        former=former,
-        reject=reject or (),
-        unit_variance=unit_variance,
-        trace=trace is not None,
-        scale=scale,
-    )
+    if scale is not None:
+        number("--scale", scale, "positive")
+    choices: dict[str, Any] = {"method": method, "start": start, "scale": scale}
+    choices |= {"former": former, "unit_variance": unit_variance, "trace": trace is not None}
+    with at_place(Place(file)):
+        result = orient(deck.stations, reject=reject or (), **choices)
     result.messages[:0] = deck.messages
     if points and not result.usable:
         result.messages.append(Message.of("orientation.no-points"))

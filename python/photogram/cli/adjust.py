@@ -81,8 +81,10 @@ def adjust(
         print_sections(description, "`photogram info`")
     if documents.crs is not None:
         from photogram.formats.results import check_place
+        from photogram.io.places import Place, at_place
 
-        check_place(project.block, documents.crs)
+        with at_place(Place(), "--crs"):
+            check_place(project.block, documents.crs)
     block, started = started_block(project, keep_all=keep_all)
     if plan:
         from photogram.distributed import plan_in_parts

@@ -35,8 +35,11 @@ class Unknowns:
     def of(self, project: Project, choices: Mapping[str, Any]) -> Project:
         """Return the project with these unknowns and the chosen options."""
         from photogram.formats.supplements import held_points, self_calibrated
+        from photogram.io.places import Place, at_place
 
-        project = held_points(self_calibrated(project, list(self.self_calibrate)), list(self.hold))
+        with at_place(Place(), "--self-calibrate"):
+            project = self_calibrated(project, list(self.self_calibrate))
+        project = held_points(project, list(self.hold))
         if self.hold and choices.get("datum") in ("inner", "minimum"):
             raise misuse("--datum", "conflict", options="--hold")
         own = {"datum": None} if self.hold else {}

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import orjson
 
-from photogram.arguments.arrays import argument_error, is_covariance, number, shaped, truth_value
+from photogram.arguments.arrays import argument_error, matrix_fault, number, shaped, truth_value
 from photogram.arguments.fields import Checked, check_fields, option
 from photogram.arguments.types import Floats
 from photogram.comparator.fits import COUNT, Frame, Polynomial, design
@@ -22,7 +21,6 @@ from photogram.comparator.readings import LARGEST_UM, Session
 from photogram.errors import InputError
 from photogram.io import json
 from photogram.io.delimited import cells
-from photogram.io.files import read_bytes
 from photogram.io.places import at_place
 from photogram.lazy_dataclasses import dataclass, field, fields
 from photogram.messages import Message
@@ -134,8 +132,8 @@ class Correction:
                     raise argument_error("polynomial", "finite", value=value)
             for half in self.polynomial.frame.half_range_um:
                 number("half_range_um", half, "positive")
-        if self.covariance.shape != 2 * (PARAMETERS,) or not is_covariance(self.covariance, singular=True):
-            raise InputError(phrase("error.covariance-singular"))
+        if fault := matrix_fault(shaped("covariance", self.covariance, 2 * (PARAMETERS,)), singular=True):
+            raise InputError(fault)
 
     @property
     def matrix(self) -> Floats:
@@ -272,14 +270,7 @@ class Correction:
 
     def document(self) -> dict[str, Any]:
         """Return the members of the JSON document, with units in their names."""
-        document: dict[str, Any] = {
-            "scale_x": self.scale_x,
-            "scale_y": self.scale_y,
-            "nonorthogonality_rad": self.nonorthogonality_rad,
-            "polynomial": None,
-            "covariance": self.covariance,
-            "identity": self.identity,
-        }
+        document: dict[str, Any] = {each.name: getattr(self, each.name) for each in fields(self)}
         if self.polynomial is not None:
             document["polynomial"] = {
                 "centre_um": self.polynomial.frame.centre_um,
@@ -308,11 +299,9 @@ class Correction:
             )
         scale_x, scale_y, lean = (document[name] for name in ("scale_x", "scale_y", "nonorthogonality_rad"))
         given = document["identity"]
-        identity = (
-            None if given is None else Identity(**{own.name: given[own.name] for own in fields(Identity)})
-        )
+        known = {} if given is None else {own.name: given[own.name] for own in fields(Identity)}
         covariance = shaped("covariance", document["covariance"], (PARAMETERS, PARAMETERS))
-        return cls(scale_x, scale_y, lean, polynomial, covariance, identity)
+        return cls(scale_x, scale_y, lean, polynomial, covariance, Identity(**known) if known else None)
 
     def to_json(self) -> bytes:
         """Return the correction as a JSON document (UTF-8)."""
@@ -328,7 +317,7 @@ class Correction:
             If the file cannot be read or does not contain a correction.
         """
         with json.holding("correction of a comparator", path):
-            document = orjson.loads(read_bytes(path))
+            document = json.read_json(path).value
             if document.get("usable") is False:
                 raise InputError(phrase("comparators.withheld"))
             return cls.from_document(document.get("correction", document))
@@ -403,9 +392,8 @@ def correct_table(
             variances = np.diagonal(correction.covariance_of(xy_um), axis1=1, axis2=2)
             # Rounding may make a zero variance negative.
             values = np.hstack([correction.apply(xy_um), np.sqrt(np.maximum(variances, 0.0))])
-    if not np.isfinite(values).all():
-        worst = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
-        raise table.records.error(worst, phrase("comparators.infinite"))
+    for row in np.flatnonzero(~np.isfinite(values).all(axis=1)).tolist():
+        raise table.records.error(row, phrase("comparators.infinite"))
     reach = correction.reach(readings)
     remarks = _outside(correction, table, readings, reach, extrapolate=extrapolate)
     in_range = ["" if np.isnan(far) else "yes" if far <= 1 + ROUNDING else "no" for far in reach.tolist()]

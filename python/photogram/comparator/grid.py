@@ -216,14 +216,9 @@ def read_grid(path: Path) -> Grid:
     path = path_of("path", path)
     table = read_table(path, "point", keys=KEYS)
     rows, xy_um = table.measured()
+    rows.names_once("point")
     settings = {name: value for name, value in table.settings.items() if name not in ("grid", "owner")}
-    return Grid(
-        table.settings.get("grid", 0),
-        rows.wholes("point"),
-        xy_um,
-        source=path,
-        **settings,
-    )
+    return Grid(table.settings.get("grid", 0), rows.wholes("point"), xy_um, source=path, **settings)
 
 
 def with_corrections(grid: Grid, points: Indices, corrections_um: Floats, sigma_um: float, when: str) -> Grid:

@@ -13,7 +13,7 @@ from typing import Any, cast, get_args
 
 import numpy as np
 
-from photogram.arguments.arrays import is_covariance
+from photogram.arguments.arrays import matrix_fault
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
 from photogram.film.distances import Crossing, MarkDistance, RightAngle
@@ -283,6 +283,6 @@ def _covariance(path: Path, camera: str, fields: list[str], sd: Floats) -> Float
             raise table.cell_error(row, "covariance", "error.empty")
         i, j = map(fields.index, pair)
         found[i, j] = found[j, i] = values[row]
-    if not is_covariance(found, singular=True):
-        raise InputError(phrase("error.covariance-singular"), file=path)
+    if fault := matrix_fault(found, singular=True):
+        raise InputError(fault, file=path)
     return found

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram.adjustment.options import AdjustOptions
-from photogram.arguments.arrays import is_covariance, repeated_pairs
+from photogram.arguments.arrays import matrix_fault, repeated_pairs
 from photogram.arguments.types import Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.crs import amid, to_frame, turn_to_frame
@@ -309,8 +309,10 @@ class BlockBuilder:
                 )
         except InputError:
             for kind, names in (("photo", self.photo_ids), ("point", self.point_ids)):
-                if twice := [name for name, count in Counter(names).items() if count > 1]:
-                    raise self.place.error(phrase("error.repeated", kind=kind, name=twice[0])) from None
+                for name, count in Counter(names).items():
+                    if count > 1 or not name.isprintable():
+                        code = "error.repeated" if count > 1 else "format.name"
+                        raise self.place.error(phrase(code, kind=kind, what=kind, name=name)) from None
             raise
         return Project(
             block=block,
@@ -389,8 +391,8 @@ class BlockBuilder:
                 sd[row] = each.sd if each.crs == self.crs else np.sqrt(variances)
                 continue
             covariance = (covariance + covariance.T) / 2
-            if not is_covariance(covariance):
-                raise each.place.error(phrase("error.covariance"))
+            if fault := matrix_fault(covariance):
+                raise each.place.error(fault)
             self.observations.append(Control(self.point_ids[row], xyz, covariance=covariance))
         for key, each, xyz, covariance in self._located(self._checks):
             row = rows[key]

@@ -17,6 +17,7 @@ from photogram.io.numbers import scaled
 from photogram.io.places import Failing
 from photogram.network.cameras import Camera
 from photogram.network.equivalent_cameras import OpencvLens, opencv_lens
+from photogram.network.geometry import rotation_fault
 from photogram.words import phrase
 
 
@@ -116,17 +117,10 @@ Y_DOWN: Floats = np.diag([1.0, -1.0, -1.0])
 """Transformation between axes x right, y up, z back and axes x right, y down, z forward."""
 
 
-def is_rotation(matrix: Floats, tolerance: float = 1e-6) -> bool:
-    """Return whether a (3, 3) matrix is a rotation within the precision of a file."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        apart = np.abs(matrix @ matrix.T - np.eye(3)).max()
-    return bool(apart < tolerance and np.linalg.det(matrix) > 0)
-
-
 def checked_rotation(place: Failing, matrix: Floats, tolerance: float = 1e-6) -> Floats:
     """Return a rotation matrix of a file, orthonormalised; reject other matrices."""
-    if not is_rotation(matrix, tolerance):
-        raise place.error(phrase("format.rotation"))
+    if reason := rotation_fault(matrix, tolerance):
+        raise place.error(phrase("format.rotation", reason=reason))
     return np.asarray(matrix @ (3 * np.eye(3) - matrix.T @ matrix) / 2)
 
 

@@ -166,7 +166,7 @@ def _tracks(
     path: Path, names: list[str], points: list[str], messages: list[Message]
 ) -> tuple[Indices, Indices, Floats]:
     """Return photo, point and (m, 2) normalised coordinates of observations; none without a file."""
-    lines = read_lines(path) if path.is_file() else []
+    lines = read_lines(path) if path.exists() else []
     width = _VERSIONS.get(lines[0].strip(), 0) if lines else 0
     if lines and not width and lines[0].startswith("OPENSFM_TRACKS_VERSION"):
         one_word(Place(path, 1, lines[0]), "version", lines[0], _VERSIONS)

@@ -106,7 +106,7 @@ def calibration_of(project: Project) -> Calibration:
     elif all(name in (times := project.details.get(TIMES, {})) for name in corners.pictures):
         corners = corners.replace(times=[times[name] for name in corners.pictures])
     return Calibration(
-        board=_with_places(board, block, number),
+        board=_with_places(board, project, number),
         corners=corners,
         cameras=[shifted(each, -MIDDLE) for each in block.cameras],
         poses=vision_poses(block.photo_positions[seen], attitudes),
@@ -215,14 +215,15 @@ def _numbers_of(project: Project, board: Board) -> Indices:
     return np.array([known[name] for name in ids], dtype=np.int64)
 
 
-def _with_places(board: Board, block: Block, number: Indices) -> Board:
+def _with_places(board: Board, project: Project, number: Indices) -> Board:
     """Return a board with positions and standard deviations of control."""
+    block = project.block
     if board.kind == "points":
         return board.replace(points=block.point_positions, point_names=block.point_ids)
     far = np.abs(board.places[number] - block.point_positions)
     if not far.max(initial=0.0) < NEAR * min(board.pitch):
         fields = {"point": block.point_ids[int(np.argmax(far.max(axis=1)))], "difference": float(far.max())}
-        raise InputError(phrase("board-project.position", **fields))
+        raise InputError(phrase("board-project.position", **fields), file=project.path)
     if board.shape != "points":
         return board
     sd = np.zeros((len(board.places), 3))

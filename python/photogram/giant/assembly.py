@@ -189,16 +189,14 @@ def _principal_distances(project: Project, images: list[ImageFrame]) -> Floats:
     cameras = {camera.name: camera.principal_distance for camera in project.cameras}
     for each in images:
         if not each.principal_distance and each.camera not in cameras:
-            fields = {"frame": each.name, "camera": each.camera, "names": [*map(repr, cameras)]}
+            names = [*map(repr, cameras)] or phrase("part.none")
+            fields = {"frame": each.name, "camera": each.camera, "names": names}
             raise error_at(each.record, phrase("giant.unknown-camera", **fields))
     return np.array([each.principal_distance or cameras[each.camera] for each in images])
 
 
 def _first_images(
-    images: list[ImageFrame],
-    image_photos: Indices,
-    image_points: Indices,
-    messages: list[Message],
+    images: list[ImageFrame], image_photos: Indices, image_points: Indices, messages: list[Message]
 ) -> Indices:
     pairs = image_photos * (image_points.max() + 1) + image_points
     order = np.argsort(pairs, kind="stable")

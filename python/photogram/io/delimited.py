@@ -377,7 +377,8 @@ def _parquet(
                 yield _of_arrow(path, pyarrow.Table.from_batches([batch]), spelling, numbers, first)
                 first += len(batch)
     except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(phrase("error.parse", format="Parquet", reason=str(error)), file=path) from None
+        reason = str(error).split("\n")[0]
+        raise InputError(phrase("error.parse", format="Parquet", reason=reason), file=path) from None
 
 
 def _of_arrow(

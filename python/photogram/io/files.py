@@ -71,6 +71,16 @@ def decoded(data: bytes, *, whole: bool = True) -> str:
     return data.decode("latin-1")
 
 
+def read_utf8(path: Path) -> str:
+    """Read a text file that must be in UTF-8; a byte order mark is omitted."""
+    data = read_bytes(path)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        record = data.count(b"\n", 0, error.start) + 1
+        raise InputError(phrase("error.encoding", byte=error.start), file=path, record=record) from None
+
+
 def read_lines(path: Path) -> list[str]:
     """Read the lines of a text file as :func:`read_text` does, without line ends."""
     lines = read_text(path).removesuffix("\x1a").split("\n")

@@ -10,7 +10,7 @@ import numpy as np
 import orjson
 
 from photogram.errors import InputError, message_of
-from photogram.io.files import read_bytes
+from photogram.io.files import read_bytes, read_utf8
 from photogram.io.tree import Tree
 from photogram.words import phrase
 
@@ -52,7 +52,7 @@ def holding(what: str, path: Path | None = None) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise InputError(message_of(error), file=path) from None
+        raise (error if error.file else InputError(message_of(error), file=path)) from None
     except (AttributeError, LookupError, TypeError, ValueError) as error:
         missing = isinstance(error, KeyError)
         reason = phrase("error.missing", name=str(error)) if missing else phrase("error.member")
@@ -64,7 +64,7 @@ def read_json(path: Path) -> Tree:
     try:
         return Tree(orjson.loads(data), path)
     except orjson.JSONDecodeError as error:
-        lines = data.decode("utf-8", "replace").split("\n")
+        lines = read_utf8(path).split("\n")
         record = min(error.lineno, len(lines))
         reason = phrase("error.at-column", message=error.msg, column=error.colno)
         message = phrase("error.parse", format="JSON", reason=reason)

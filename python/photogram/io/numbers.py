@@ -17,7 +17,7 @@ LARGEST_INTEGER = 2**63 - 1  # The largest 64-bit integer
 
 LONGEST = 1_000  # Largest number of characters of a number: 767 digits distinguish any doubles
 
-_WHOLE = re.compile(r"\+?[0-9]+")
+_WHOLE = re.compile(r"\+?[0-9]+|-[1-9][0-9]*")
 _NUMBER = re.compile(r"[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _GROUPS = re.compile(r"[+-]?\d{1,3}(?:(?P<mark>['’ \u00a0\u202f.,])\d{3})+(?!\d)")
 _SIMPLE = re.compile(r"[+-]?\d*\.?\d*(?:[eE][+-]?\d+)?")
@@ -105,11 +105,12 @@ def marks_of(cells: Iterable[str], delimiter: str) -> Marks:
         if other in cell:
             decimals.add(mark)
             thousands.add(other)
-        elif cell.count(mark) > 1:
-            thousands.add(mark)
         elif _GROUPS.fullmatch(_BLANKS.sub("", cell)):
-            doubtful = doubtful if mark == "." else mark
-        else:
+            if cell.count(mark) > 1:
+                thousands.add(mark)
+            else:
+                doubtful = doubtful if mark == "." else mark
+        elif cell.count(mark) == 1:
             decimals.add(mark)
     if thousands:
         return Marks("," if "." in thousands else ".", True)

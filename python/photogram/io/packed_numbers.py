@@ -82,8 +82,12 @@ def at(path: Path, index: int, message: str | Phrase) -> InputError:
             lines += piece.count(b"\n")
             continue
         for record, line in enumerate(piece.split(b"\n"), lines + 1):
-            words += len(line.split())
-            if words > index:
+            count = len(line.split())
+            if words + count > index:
                 text = line.decode("latin-1").strip("\r")[:SHOWN]
+                if isinstance(message, Phrase):
+                    word = phrase("collection.word", word=line.split()[index - words].decode("latin-1"))
+                    message = phrase(message.code, **message.fields, word=word)
                 return InputError(message, file=path, record=record, text=text)
+            words += count
     return InputError(message, file=path)

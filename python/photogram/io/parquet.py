@@ -109,7 +109,8 @@ def read_sheet(path: Path) -> Sheet:
     try:
         table = pyarrow.parquet.read_table(path, page_checksum_verification=True)
     except (OSError, pyarrow.ArrowException) as error:
-        raise InputError(phrase("error.parse", format="Parquet", reason=str(error)), file=path) from None
+        reason = str(error).split("\n")[0]
+        raise InputError(phrase("error.parse", format="Parquet", reason=reason), file=path) from None
     return Sheet(path, {name: _values(path, name, table.column(name)) for name in table.column_names})
 
 

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 
 from photogram.arguments.arrays import value_field
 from photogram.errors import InputError
-from photogram.io.files import read_bytes
+from photogram.io.files import read_utf8
 from photogram.io.places import Place
 from photogram.io.tree import Tree
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -34,10 +34,7 @@ class TomlFile:
 
     def __init__(self, path: Path, replaced: Sequence[str] = ()) -> None:
         self.path = path
-        try:
-            text = read_bytes(path).decode("utf-8-sig").replace("\r\n", "\n")
-        except UnicodeDecodeError as error:
-            raise InputError(phrase("error.encoding", byte=error.start), file=path) from None
+        text = read_utf8(path).replace("\r\n", "\n")
         self.lines = text.split("\n")
         if (endless := _ENDLESS.search(text)) is not None:
             record = text.count("\n", 0, endless.start()) + 1
@@ -48,7 +45,7 @@ class TomlFile:
         except tomllib.TOMLDecodeError as error:
             where = re.search(r"at line (\d+)", str(error))
             message = phrase("error.parse", format="TOML", reason=str(error))
-            raise self._place(int(where[1]) if where else None).error(message) from None
+            raise self._place(int(where[1]) if where else len(self.lines)).error(message) from None
         except RecursionError:
             raise InputError(phrase("error.nested"), file=path) from None
         self._replaced: dict[tuple[str, str], str] = {}
@@ -89,7 +86,7 @@ class TomlFile:
         own = list(self._lines_of(section)) if section else []
         first = rf"^\s*\[?\[?\s*{word}"
         # Inline tables and names with points have their keys inside a line.
-        for lines, pattern in ((own, first), (own, rf"^[^#]*[\[{{,.\s]{word}")):
+        for lines, pattern in ((own, first), (own, rf"^[^#]*[\[{{,.\s]{word}")) if key else ():
             for record, line in lines or enumerate(self.lines, 1):
                 if re.match(pattern, line):
                     return self._place(record)
@@ -188,7 +185,11 @@ class TomlTree(Tree):
         return replace(self, value=value, key=key)
 
     def error(self, message: str | Phrase) -> InputError:
-        """Return an error that names file, line, table and key."""
+        """Return an error that names file, line, table and key, also of a member that the message names."""
+        if isinstance(message, Phrase) and message.code == "error.at":
+            member, inner = message.fields["what"], message.fields["message"]
+            if member == self.key or (isinstance(self.value, dict) and member in self.value):
+                return (self if member == self.key else self[member]).error(inner)
         if self.path:
             message = phrase("error.key", table=self.path, key=self.key, message=message)
         elif self.key:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import LARGEST_SD, argument_error, is_covariance, number, one_of, shaped, text
+from photogram.arguments.arrays import LARGEST_SD, argument_error, matrix_fault, number, one_of, shaped, text
 from photogram.arguments.equality import Valued
 from photogram.arguments.fields import check_fields
 from photogram.arguments.objects import kind_error, require
@@ -285,7 +285,8 @@ class Camera(Valued, Brief):
         different = names and len(set(names)) == len(names)
         require(different, where, "kind", kind="a pair of different names and a matrix", value=names)
         checked = shaped(where, matrix, (len(names), len(names)))
-        require(is_covariance(checked), where, "covariance")
+        if fault := matrix_fault(checked):
+            raise InputError(phrase("error.at", what=where, message=fault))
         return names, checked
 
     @property

@@ -124,6 +124,16 @@ def rotation_angles(matrices: ArrayLike) -> Floats:
     return _photocore.rotation_angles(_floats(matrices))
 
 
+def rotation_fault(matrix: Floats, tolerance: float = 1e-6) -> Phrase | None:
+    """Return the fault of a (3, 3) matrix of a file; None for a rotation within the precision of the file."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        apart = np.abs(matrix @ matrix.T - np.eye(3))
+    if apart.max() < tolerance:
+        return None if np.linalg.det(matrix) > 0 else phrase("format.rotation.mirrored")
+    row = int(np.argmax(apart.sum(axis=1)))
+    return phrase("format.rotation.row", row=row + 1, excess=float(apart[row].max()))
+
+
 def geographic_to_geocentric(positions: ArrayLike, spheroid: Spheroid) -> Floats:
     """Convert (n, 3) longitude (rad, east positive), latitude (rad), height to X, Y, Z.
 

@@ -25,6 +25,7 @@ from photogram.arguments.arrays import one_of, truth_value
 from photogram.arguments.objects import path_of
 from photogram.arguments.types import Floats
 from photogram.errors import InputError, PhotogramError
+from photogram.io.places import Place, at_place
 from photogram.io.records import Record, Source
 from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
@@ -52,7 +53,11 @@ class CardFormat:
         self.text = _parenthesised("".join(text.split()).upper())
         if _ALLOWED.fullmatch(self.text) is None:
             raise ValueError(phrase("format.descriptors", format=self.text))
-        _check_sizes(self.text)
+        # Sizes beyond a card would cost memory or time. Nine digits suffice, because int() has a limit.
+        numbers = [int(digits[:9]) for digits in re.findall(r"[0-9]+", self.text)]
+        groups = math.prod(int(digits[:9]) for digits in re.findall(r"([0-9]+)\(", self.text))
+        if max(numbers, default=0) > COLUMNS or groups > COLUMNS**2:
+            raise ValueError(phrase("format.sizes", format=self.text, columns=COLUMNS))
         try:
             self._reader = fortranformat.FortranRecordReader(self.text)
             ruler = "".join(chr(_FIRST + column) for column in range(4 * COLUMNS))
@@ -97,15 +102,6 @@ class CardFormat:
         if counts:
             record.remark(phrase("deck.blanks", **columns, value=raw, number=digits))
         return digits.rjust(last - first)
-
-
-def _check_sizes(text: str) -> None:
-    """Reject sizes beyond a card before they cost memory or time."""
-    # Nine digits suffice, because int() has a limit.
-    numbers = [int(digits[:9]) for digits in re.findall(r"[0-9]+", text)]
-    groups = math.prod(int(digits[:9]) for digits in re.findall(r"([0-9]+)\(", text))
-    if max(numbers, default=0) > COLUMNS or groups > COLUMNS**2:
-        raise ValueError(phrase("format.sizes", format=text, columns=COLUMNS))
 
 
 def _parenthesised(text: str) -> str:
@@ -321,10 +317,11 @@ def run_deck(
     run = Run()
     grid: Grid | None = None
     try:
-        for grid in _jobs(deck.grids()) if together else deck.grids():
-            result = determine(grid, as_published=as_published, weights=weights, unknown=unknown)
-            run.results.append(result)
-            grid = None
+        with at_place(Place(path)):
+            for grid in _jobs(deck.grids()) if together else deck.grids():
+                result = determine(grid, as_published=as_published, weights=weights, unknown=unknown)
+                run.results.append(result)
+                grid = None
     except PhotogramError as error:
         run.stop = Stop(error, deck.title, deck.number, grid)
     run.messages = [*deck.messages, *(message for result in run.results for message in result.messages)]

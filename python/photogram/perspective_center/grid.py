@@ -135,6 +135,7 @@ def joined(grids: Sequence[Grid]) -> Grid:
     )
 
 
+@np.errstate(over="ignore", invalid="ignore")
 def reduce(
     readings: Sequence[Floats],
     *,

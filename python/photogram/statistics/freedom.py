@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from photogram import _photocore
-from photogram.arguments.arrays import argument_error, is_covariance, number, numbers, shaped, truth_value
+from photogram.arguments.arrays import argument_error, matrix_fault, number, numbers, shaped, truth_value
 from photogram.arguments.arrays import probability as checked_probability
 from photogram.arguments.types import Floats
 from photogram.errors import InputError
@@ -143,8 +143,8 @@ def joint_freedom(contributions: ArrayLike, covariance_of_components: ArrayLike,
     """
     c = shaped("contributions", contributions, (None,), "not-negative")
     matrix = shaped("covariance_of_components", covariance_of_components, 2 * c.shape)
-    if not is_covariance(matrix, singular=True):
-        raise InputError(phrase("error.covariance-singular"))
+    if fault := matrix_fault(matrix, singular=True):
+        raise InputError(fault)
     number("given", given, "not-negative")
     return _freedom(float(np.sum(c)) + given, float(c @ matrix @ c) / 2)
 

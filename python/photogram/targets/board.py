@@ -300,7 +300,7 @@ def _of_toml(path: Path) -> Board:
         fields["spacing"] = file["spacing"].number()
     if "points" in file:
         fields |= _points(file["points"])
-    with at_place(Place(path)):
+    with at_place(file):
         return Board(**fields)
 
 
@@ -311,9 +311,7 @@ def _points(file: Tree) -> dict[str, Any]:
         raise file.error(phrase("targets.no-table", name=path.name))
     table = read_columns(path, known=("point",), numbers=("x", "y", "z", "sd", *_SD))
     table.require("point", "x", "y", "z")
-    places = table.vectors(("x", "y", "z"))
-    table.check_given(places, ("x", "y", "z"))
-    found: dict[str, Any] = {"points": places, "point_names": table.names_once("point")}
+    found: dict[str, Any] = {"points": table.given(("x", "y", "z")), "point_names": table.names_once("point")}
     if "sd" in table or set(_SD) & {*table.columns}:
         sd = table.vectors(_SD)
         sd = np.where(np.isnan(sd), table.numbers("sd")[:, np.newaxis], sd)

@@ -61,11 +61,9 @@ def read_storage(path: Path, board: Board | None) -> Measured:
         sizes[""] = content["image_width"].whole(1), content["image_height"].whole(1)
     grid = _matrix(content["grid_points"]) if "grid_points" in content else None
     if board is None and all(key in content for key in ("board_width", "board_height", "square_size")):
-        board = Board(
-            columns=content["board_width"].whole(),
-            rows=content["board_height"].whole(),
-            spacing=content["square_size"].number(),
-        )
+        columns, rows = content["board_width"].whole(), content["board_height"].whole()
+        with at_place(Place(path)):
+            board = Board(columns=columns, rows=rows, spacing=content["square_size"].number())
         if grid is not None:
             places, points = grid.reshape(-1, grid.shape[-1]), content["grid_points"]
             if places.shape != board.places.shape:
@@ -75,12 +73,7 @@ def read_storage(path: Path, board: Board | None) -> Measured:
     return _measured(path, xy, board, sizes)
 
 
-def _measured(
-    path: Path,
-    xy: Floats,
-    board: Board | None,
-    sizes: dict[str, tuple[int, int]],
-) -> Measured:
+def _measured(path: Path, xy: Floats, board: Board | None, sizes: dict[str, tuple[int, int]]) -> Measured:
     views, points = xy.shape[:2]
     if board is not None and len(board.places) != points:
         fields = {"points": points, "count": len(board.places), "board": board.described}
@@ -111,15 +104,8 @@ def _matrix(tree: Tree) -> Floats:
     given = data.value if isinstance(data.value, list) else None
     if given is None or len(given) != rows * cols * channels:
         raise data.error(phrase("targets.matrix", what=f"{rows} x {cols} x {channels} numbers"))
-    numbers = np.array([_coordinate(each) for each in data])
-    return numbers.reshape((rows, cols, channels) if channels > 1 else (rows, cols))
-
-
-def _coordinate(tree: Tree) -> float:
-    """Return a finite number, or NaN in OpenCV spelling for a missing corner."""
-    value = tree.value
-    missing = value.lower() in (".nan", "nan") if isinstance(value, str) else value != value
-    return np.nan if missing else tree.number()
+    numbers = [np.nan if str(each.value).lower() in (".nan", "nan") else each.number() for each in data]
+    return np.reshape(numbers, (rows, cols, channels) if channels > 1 else (rows, cols))
 
 
 def _xml(path: Path) -> dict[str, Any]:
@@ -240,6 +226,6 @@ def read_arrays(path: Path, data: bytes) -> Arrays:
                     message = phrase("targets.array-damaged", name=name, reason=str(error))
                     raise InputError(message, file=path) from None
     except UNPACKABLE as error:
-        message = phrase("error.parse", format="archive of arrays (npz)", reason=str(error))
+        message = phrase("error.parse", format="as an archive of arrays (npz)", reason=str(error))
         raise InputError(message, file=path) from None
     return Arrays(path, arrays)

@@ -7,7 +7,7 @@ A :class:`Phrase` is a code with fields until it is printed. Each language has o
 * a list format: the largest number of parts (`{names:5}`), `;`, `&` (and) or `|` (or) as separator instead of
   commas, and `#` for parts with numbers;
 * `^` for an initial capital letter, `+` for `; ` before a text that is not empty;
-* `one/several`, the words for a count of one and for other counts: `{n} {n:point/points}`;
+* `one/several`, the words for one and for other counts or lists: `{n} {n:point/points}`;
 * of `cli`, the words for users of Python and for the command line: `{cli:model/--model}`;
 * `'` for a quoted text of the input, escaped and shortened. Numbers, lists and phrases are not quoted.
 
@@ -120,8 +120,9 @@ def _chosen(sentence: str, fields: Mapping[str, Any]) -> str:
     """Return a sentence with the words for its reader and its counts."""
 
     def words(found: re.Match[str]) -> str:
-        of_python = not _on_command_line.get()
-        first = of_python if found[1] == "cli" else fields.get(found[1]) == 1
+        value = fields.get(found[1])
+        count = len(value) if isinstance(value, list | tuple) else value
+        first = not _on_command_line.get() if found[1] == "cli" else count == 1
         return _chosen(found[2 if first else 3], fields)
 
     return CHOICE.sub(words, sentence)

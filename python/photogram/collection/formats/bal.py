@@ -54,18 +54,11 @@ def read(path: Path, pieces: Iterator[bytes]) -> Collection:
 def to_bytes(collection: Collection) -> bytes:
     """Return a collection in the format; numbers read back to the last bit."""
     head = f"{len(collection.photo_parameters)} {len(collection.point_positions)} {len(collection.image_xy)}"
-    columns = zip(
-        collection.image_photos.tolist(),
-        collection.image_points.tolist(),
-        *collection.image_xy.T.tolist(),
-        strict=True,
-    )
-    images = [f"{photo} {point} {x!r} {y!r}" for photo, point, x, y in columns]
-    values = [
-        *map(repr, collection.photo_parameters.ravel().tolist()),
-        *map(repr, collection.point_positions.ravel().tolist()),
-    ]
-    return "\n".join([head, *images, *values, ""]).encode()
+    columns = (collection.image_photos, collection.image_points, *collection.image_xy.T)
+    rows = zip(*(each.tolist() for each in columns), strict=True)
+    images = (f"{photo} {point} {x!r} {y!r}" for photo, point, x, y in rows)
+    values = (*collection.photo_parameters.ravel().tolist(), *collection.point_positions.ravel().tolist())
+    return "\n".join([head, *images, *map(repr, values), ""]).encode()
 
 
 def _numbers(path: Path, pieces: Iterator[bytes]) -> tuple[tuple[int, int, int], Floats]:

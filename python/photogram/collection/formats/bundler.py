@@ -145,13 +145,8 @@ def to_bytes(collection: Collection) -> bytes:
         lines += [_line(row) for row in (parameters[6:], *matrix, parameters[3:6])]
     views: list[list[str]] = [[] for _ in collection.point_positions]
     keys = [0] * len(collection.photo_parameters)
-    images = zip(
-        collection.image_points.tolist(),
-        collection.image_photos.tolist(),
-        collection.image_xy.tolist(),
-        strict=True,
-    )
-    for point, photo, (x, y) in images:
+    columns = collection.image_points, collection.image_photos, collection.image_xy
+    for point, photo, (x, y) in zip(*(column.tolist() for column in columns), strict=True):
         views[point].append(f"{photo} {keys[photo]} {x!r} {y!r}")
         keys[photo] += 1
     for position, own in zip(collection.point_positions, views, strict=True):

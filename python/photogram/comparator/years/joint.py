@@ -31,7 +31,6 @@ from photogram.comparator.fits import rotation_matrix
 from photogram.comparator.grid import Grid
 from photogram.errors import AdjustmentError, InputError
 from photogram.io import json
-from photogram.io.files import read_bytes
 from photogram.lazy_dataclasses import dataclass, field, replace
 from photogram.memory import require
 from photogram.statistics.limits import GlobalTest, global_test
@@ -137,7 +136,7 @@ class RecordedCalibration(Checked):
             it has neither joint adjustment nor date.
         """
         with json.holding(_WHAT, path):
-            found = orjson.loads(read_bytes(path))
+            found = json.read_json(path).value
             many = found if isinstance(found, list) else [found]
             names = [path.stem] if len(many) == 1 else [f"{path.stem}-{k + 1}" for k in range(len(many))]
             return [_from_document(each, name) for each, name in zip(many, names, strict=True)]
@@ -145,8 +144,7 @@ class RecordedCalibration(Checked):
     @classmethod
     def of(cls, calibration: Calibration, name: str) -> RecordedCalibration:
         """Return the record of a calibration."""
-        with json.holding(_WHAT):
-            return _from_document(orjson.loads(calibration.to_json()), name)
+        return _from_document(orjson.loads(calibration.to_json()), name)
 
 
 def day_of(text: str) -> date:

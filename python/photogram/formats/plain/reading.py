@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from photogram.arguments.arrays import is_covariance
+from photogram.arguments.arrays import matrix_fault
 from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError
 from photogram.formats.builder import BlockBuilder
@@ -194,8 +194,8 @@ def read_control(tables: Tables, table: ColumnTable, transform: Transform) -> _G
     isotropic = (covariances == covariances[:, :1, :1] * np.eye(3)).all(axis=(1, 2))
     correlated = (turned * (1 - np.eye(3))).any(axis=(1, 2)) & np.isfinite(sd).all(axis=1)
     for row in np.flatnonzero(is_control & correlated & ~isotropic).tolist():
-        if not is_covariance(turned[row]):
-            raise table.error(row, phrase("error.covariance"))
+        if fault := matrix_fault(turned[row]):
+            raise table.error(row, fault)
         observed.append(Control(names[row], values[row], covariance=(turned[row] + turned[row].T) / 2))
         held[row] = np.inf
     off = np.array([use == "off" for use in uses], dtype=bool)[:, np.newaxis]

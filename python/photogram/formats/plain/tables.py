@@ -16,7 +16,7 @@ from photogram.arguments.types import Bools, Floats, Indices
 from photogram.errors import InputError, message_of
 from photogram.formats.column_words import is_angular
 from photogram.formats.columns import PLAIN, check_unread, degrees, in_units, is_geographic, nameless, settled
-from photogram.formats.images import Y_DOWN, is_rotation
+from photogram.formats.images import Y_DOWN
 from photogram.formats.plain.schema import (
     ALL_ANGLES,
     ANGLES,
@@ -37,7 +37,7 @@ from photogram.lazy_dataclasses import dataclass, field
 from photogram.messages import Message
 from photogram.network.attitudes import Attitudes, Representation, angles_form, known_angles
 from photogram.network.block import Block
-from photogram.network.geometry import Frame
+from photogram.network.geometry import Frame, rotation_fault
 from photogram.network.observations import Observation, Observations
 from photogram.network.unknowns import Unknown
 from photogram.words import Phrase, phrase
@@ -266,8 +266,8 @@ class Tables:
                 size = float(np.linalg.norm(values[row]))
                 if kind == "quaternion" and not 0.99 < size < 1.01:
                     raise table.error(row, phrase("plain.quaternion", length=size))
-                if kind == "matrix" and not is_rotation(values[row].reshape(3, 3)):
-                    raise table.error(row, phrase("plain.rotation-matrix"))
+                if kind == "matrix" and (reason := rotation_fault(values[row].reshape(3, 3))):
+                    raise table.error(row, phrase("plain.rotation-matrix", reason=reason))
             given = values[known].reshape(-1, 3, 3) if kind == "matrix" else values[known]
             own = Attitudes.of(cast("Representation", kind), given).matrices
             if kind not in ("yaw_pitch_roll", "azimuth_tilt_swing"):

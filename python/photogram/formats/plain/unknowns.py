@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from photogram.arguments.arrays import is_covariance
+from photogram.arguments.arrays import matrix_fault
 from photogram.arguments.types import Floats
 from photogram.formats.plain.schema import ANGULAR, OPK, TURNS, Column, Parameter
 from photogram.formats.plain.tables import (
@@ -228,8 +228,8 @@ class Covariances:
         if missing := [word for word in components if word not in variances]:
             message = phrase("plain.no-covariance", kind=kind, name=name, component=missing[0])
             raise self.table.error(own[0][0], message)
-        if not is_covariance(found, singular=singular):
-            raise self.table.error(own[0][0], phrase("error.covariance-singular"))
+        if fault := matrix_fault(found, singular=singular):
+            raise self.table.error(own[0][0], fault)
         return found
 
     def priors(self, unknowns: Iterable[Unknown]) -> list[Observation]:
