@@ -392,8 +392,9 @@ def correct_table(
             variances = np.diagonal(correction.covariance_of(xy_um), axis1=1, axis2=2)
             # Rounding may make a zero variance negative.
             values = np.hstack([correction.apply(xy_um), np.sqrt(np.maximum(variances, 0.0))])
-    for row in np.flatnonzero(~np.isfinite(values).all(axis=1)).tolist():
-        raise table.records.error(row, phrase("comparators.infinite"))
+    if not np.isfinite(values).all():
+        worst = int(np.flatnonzero(~np.isfinite(values).all(axis=1))[0])
+        raise table.records.error(worst, phrase("comparators.infinite"))
     reach = correction.reach(readings)
     remarks = _outside(correction, table, readings, reach, extrapolate=extrapolate)
     in_range = ["" if np.isnan(far) else "yes" if far <= 1 + ROUNDING else "no" for far in reach.tolist()]
