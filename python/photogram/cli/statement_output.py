@@ -30,6 +30,13 @@ def _reasons(texts: Sequence[str]) -> dict[str, str]:
     return {point.strip(): reason.strip() for point, _, reason in reasons}
 
 
+def _figures(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(map(float, text.split(",")))
+    except ValueError:
+        raise ValueError("NUMBER,..") from None
+
+
 @dataclass(frozen=True)
 class StatementOptions:
     """Options of an accuracy statement; a project can define them, too."""
@@ -41,10 +48,15 @@ class StatementOptions:
     area: str | None = None
     without: Mapping[str, str] | None = option(None, kind=list[str], parse=_reasons)
     independent: Literal["yes", "same-base", "no"] | None = None
+    survey_common_sd: tuple[float, ...] | None = option(None, kind=str, parse=_figures)
+    survey_common_in_control: bool | None = None
     language: Literal["en", "de"] | None = None
     text: InputFile = None
     budgets: tuple[str, ...] | None = option(None, kind=list[str], parse=tuple, name="--budget")
     coverage: Annotated[float | None, typer.Option(min=0.01, max=0.999999)] = None
+    limit: tuple[float, ...] | None = option(None, kind=str, parse=_figures, name="--length-limit")
+    expansion: float | None = None
+    title: str | None = None
     project: str | None = None
     client: str | None = None
     firm: str | None = None
@@ -86,7 +98,7 @@ OfHead = Annotated[
     StatementOptions,
     Without(
         *("standards", "class_3d", "area", "without", "independent", "language", "text", "budgets"),
-        "coverage",
+        *("coverage", "survey_common_sd", "survey_common_in_control", "limit", "expansion"),
     ),
 ]
 """Options for the head of the page and the classes, for projects of other programs."""
