@@ -136,7 +136,16 @@ def test_every_option_is_taken_or_refused_of_a_project_on_disk():
         for each in signature(command.callback).parameters.values()
         if each.name not in of_files | {"path", "example"}
     }
-    of_statements = {"--project", "--client", "--firm", "--surveyor", "--date", "--class-h", "--class-v"}
+    of_statements = {
+        "--project",
+        "--client",
+        "--firm",
+        "--surveyor",
+        "--title",
+        "--date",
+        "--class-h",
+        "--class-v",
+    }
     assert options == REFUSED.keys() | of_statements | TAKEN - {"PATH", "--set", "--sd"}
     assert not REFUSED.keys() & TAKEN
 
