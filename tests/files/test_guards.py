@@ -348,16 +348,21 @@ def test_a_table_outside_the_folder_of_its_project_is_an_input(run, tmp_path, ou
         assert content(tmp_path) == before
 
 
-def test_a_table_of_parquet_outside_the_folder_of_its_project_is_an_input(run, tmp_path):
+@pytest.mark.parametrize(
+    ("kind", "package", "options"),
+    [("parquet", "pyarrow", ["info", "--json"]), ("xlsx", "openpyxl", ["adjust", "--no-html", "--xlsx"])],
+)
+def test_a_binary_table_outside_the_folder_of_its_project_is_an_input(run, tmp_path, kind, package, options):
     pandas = pytest.importorskip("pandas")
-    pytest.importorskip("pyarrow")
-    project, images = tmp_path / "project", tmp_path / "other.parquet"
+    pytest.importorskip(package)
+    project, images = tmp_path / "project", tmp_path / f"other.{kind}"
     shutil.copytree(EXAMPLES / "project", project)
     table = pandas.read_csv(project / "images.csv", comment="#")
     outside(project, "images.csv", images)
-    table.to_parquet(images)
+    table.to_parquet(images) if kind == "parquet" else table.to_excel(images, index=False)
     before = images.read_bytes()
-    result = run("info", project, "--json", images)
+    command, *words = options
+    result = run(command, project, *words, images)
     assert result.exit_code == 1
     assert "must not be written over the input" in result.stderr
     assert images.read_bytes() == before

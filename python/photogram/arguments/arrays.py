@@ -337,17 +337,12 @@ def matrix_fault(matrix: NDArray[np.float64], *, singular: bool = False) -> Phra
         limits = np.sqrt(np.abs(np.outer(variances, variances)))
         wrong = (matrix != matrix.T) & ~(np.abs(matrix - matrix.T) <= _ROUNDING * limits)
         wrong |= ~(np.abs(matrix) <= (1 + _ROUNDING) * limits) | np.diag(variances < 0)
-    elements = [
-        phrase(
-            "error.elements",
-            n=1 + (i != j),
-            row=i,
-            column=j,
-            values=matrix[[i, j], [j, i]][: 1 + (i != j)].tolist(),
-        )
-        for i, j in np.argwhere(wrong)[:1].tolist()
-    ]
-    return phrase(f"error.covariance{'-singular' * singular}", reason=elements)
+    reason: list[Phrase] = []
+    if wrong.any():
+        i, j = np.argwhere(wrong)[0].tolist()
+        values = matrix[[i, j], [j, i]].tolist() if i != j else [float(matrix[i, i])]
+        reason = [phrase("error.elements", n=len(values), row=i, column=j, values=values)]
+    return phrase("error.covariance-singular" if singular else "error.covariance", reason=reason)
 
 
 def chosen(which: NDArray[np.bool_]) -> NDArray[np.bool_] | slice:

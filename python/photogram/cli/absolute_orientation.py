@@ -90,10 +90,17 @@ def absolute_orientation(
         former = read_similarity(restart) if own else read_restart(restart, deck.stations, deck.messages)
     if scale is not None:
         number("--scale", scale, "positive")
-    choices: dict[str, Any] = {"method": method, "start": start, "scale": scale}
-    choices |= {"former": former, "unit_variance": unit_variance, "trace": trace is not None}
     with at_place(Place(file)):
-        result = orient(deck.stations, reject=reject or (), **choices)
+        result = orient(
+            deck.stations,
+            method=method,
+            start=start,
+            former=former,
+            reject=reject or (),
+            unit_variance=unit_variance,
+            trace=trace is not None,
+            scale=scale,
+        )
     result.messages[:0] = deck.messages
     if points and not result.usable:
         result.messages.append(Message.of("orientation.no-points"))

@@ -86,6 +86,7 @@ def marks(
         kind, remarks, counts = "For MicMac", (), {"files": len(files)}
     figures = [Fact.of(key.capitalize(), count) for key, count in counts.items()]
     members = {**counts, "messages": coded(remarks)}
-    document = Document(kind, "", [], [], figures, [remarks_section(remarks)], members)
+    sections = [remarks_section(remarks)]
+    document = Document(kind, "", highlights=figures, sections=sections, members=members)
     written = {} if out is None else {out / file: content for file, content in files.items()}
     job.finish(written, document=document, summary=lambda: print_document(document, "--json FILE", "remarks"))

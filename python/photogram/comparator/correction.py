@@ -298,10 +298,11 @@ class Correction:
                 np.zeros((2 * COUNT, 2 * COUNT)),
             )
         scale_x, scale_y, lean = (document[name] for name in ("scale_x", "scale_y", "nonorthogonality_rad"))
-        given = document["identity"]
-        known = {} if given is None else {own.name: given[own.name] for own in fields(Identity)}
+        identity = document["identity"]
+        if identity is not None:
+            identity = Identity(**{own.name: identity[own.name] for own in fields(Identity)})
         covariance = shaped("covariance", document["covariance"], (PARAMETERS, PARAMETERS))
-        return cls(scale_x, scale_y, lean, polynomial, covariance, Identity(**known) if known else None)
+        return cls(scale_x, scale_y, lean, polynomial, covariance, identity)
 
     def to_json(self) -> bytes:
         """Return the correction as a JSON document (UTF-8)."""

@@ -41,6 +41,7 @@ ORIENTATIONS = {
 }
 """Rows: the axes of a camera orientation in the axes of photogram: x right, y up, z back."""
 CENTER = 0.5  # Shift from the centre of the first pixel (0, 0) to coordinates from its corner
+_Photo = tuple[Element, int, str, tuple[Floats, Floats, str] | None, tuple[Floats, str] | None]
 _TERMS = {"K1": "k1", "K2": "k2", "K3": "k3", "P1": "p2", "P2": "p1"}
 """Terms of OpenCV: P1 is the coefficient of r^2 + 2 x^2 in x, which OpenCV calls p2."""
 _READINGS: Mapping[str, Callable[[Mapping[str, float]], Mapping[str, float]]] = {
@@ -60,7 +61,8 @@ class _Reader(BlockBuilder):
         self.given_sd, self.systems = options.sd, dict[str, str]()
         self.axes: list[Floats] = []  # Of each camera
         self.positions = 0  # Number of observed positions
-        self.waiting: list[tuple[Any, ...]] = []  # Photos of a group, whose elements need far more memory
+        # Photos of a group: id, path, pose (centre, rotation, CRS), observed centre with CRS
+        self.waiting: list[_Photo] = []
         self.measured: list[tuple[int, int, float, float, bool]] = []
         """Photo id, point, x, y, and whether these are millimetres from the principal point."""
         self.in_millimetres: Element | None = None  # The first observation in millimetres
@@ -159,7 +161,7 @@ def _photo(found: _Reader, element: Element) -> None:
         given, metadata = (centre, rotation, srs), pose.child("Metadata")
         if metadata is not None and (own := metadata.child("Center")) is not None:
             observed = _position(own), metadata.word("SRSId")
-    element.children.clear()
+    element.children.clear()  # They need far more memory
     found.waiting.append((element, number, path, given, observed))
 
 

@@ -22,7 +22,7 @@ import numpy as np
 from photogram import _photocore
 from photogram.errors import InputError
 from photogram.io.column_table import COMMENT, Cells, ColumnTable, NameColumn, merged
-from photogram.io.files import decoded, paths_read, read_beginning, read_lines, read_text, reading
+from photogram.io.files import decoded, read_beginning, read_lines, read_text, reading
 from photogram.io.numbers import marks_of
 from photogram.io.places import Place
 from photogram.words import Phrase, phrase
@@ -76,8 +76,8 @@ def read_batches(
     the error of a first record without a known column.
     """
     if path.suffix == ".parquet":
-        paths_read.get(set()).add(path)
-        return _parquet(path, spelling, numbers, size)
+        with reading(path):
+            return _parquet(path, spelling, numbers, size)
 
     def header(text: str) -> _Header:
         head = _head(path, text, known, spelling, hint)

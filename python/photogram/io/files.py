@@ -15,7 +15,7 @@ from photogram.words import phrase
 HEAD = 4096  # Bytes in which two-byte encodings without byte order mark are detected
 
 paths_read = ContextVar[set[Path]]("paths_read")
-"""Set that receives the paths of all files that are read."""
+"""Set that receives the paths of files that are read."""
 
 
 @contextmanager
@@ -49,7 +49,8 @@ def read_text(path: Path) -> str:
     The first sheet of an Excel workbook is text, too: one line per row, with tabs between cells.
     """
     if path.suffix.lower() == ".xlsx":
-        return sheet_text(path)
+        with reading(path):
+            return sheet_text(path)
     data = read_bytes(path)
     text = decoded(data)
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
@@ -71,9 +72,8 @@ def decoded(data: bytes, *, whole: bool = True) -> str:
     return data.decode("latin-1")
 
 
-def read_utf8(path: Path) -> str:
-    """Read a text file that must be in UTF-8; a byte order mark is omitted."""
-    data = read_bytes(path)
+def utf8_text(data: bytes, path: Path) -> str:
+    """Decode a file that must be in UTF-8; a byte order mark is omitted."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -10,7 +10,7 @@ import numpy as np
 import orjson
 
 from photogram.errors import InputError, message_of
-from photogram.io.files import read_bytes, read_utf8
+from photogram.io.files import read_bytes, utf8_text
 from photogram.io.tree import Tree
 from photogram.words import phrase
 
@@ -64,7 +64,7 @@ def read_json(path: Path) -> Tree:
     try:
         return Tree(orjson.loads(data), path)
     except orjson.JSONDecodeError as error:
-        lines = read_utf8(path).split("\n")
+        lines = utf8_text(data, path).split("\n")
         record = min(error.lineno, len(lines))
         reason = phrase("error.at-column", message=error.msg, column=error.colno)
         message = phrase("error.parse", format="JSON", reason=reason)

@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 
 from photogram.arguments.arrays import value_field
 from photogram.errors import InputError
-from photogram.io.files import read_utf8
+from photogram.io.files import read_bytes, utf8_text
 from photogram.io.places import Place
 from photogram.io.tree import Tree
 from photogram.lazy_dataclasses import dataclass, field, replace
@@ -34,7 +34,7 @@ class TomlFile:
 
     def __init__(self, path: Path, replaced: Sequence[str] = ()) -> None:
         self.path = path
-        text = read_utf8(path).replace("\r\n", "\n")
+        text = utf8_text(read_bytes(path), path).replace("\r\n", "\n")
         self.lines = text.split("\n")
         if (endless := _ENDLESS.search(text)) is not None:
             record = text.count("\n", 0, endless.start()) + 1

@@ -63,8 +63,7 @@ def _add_points(
     own, covariances = own[given], covariances[given]
     bad = ~(np.linalg.eigvalsh(covariances) > 0).all(axis=1)
     if bad.any():
-        point = points.ids[rows[own[bad]][0]]
-        raise block.place.error(phrase("isis.covariance", point=point))
+        raise block.place.error(phrase("isis.covariance", point=points.ids[rows[own[bad]][0]]))
     if spheroid:
         axes = local_frames(coordinates[own])
         covariances = axes @ covariances @ axes.transpose(0, 2, 1)

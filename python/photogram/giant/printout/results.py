@@ -93,7 +93,7 @@ def residual_pages(
 def _entries(name: str, frames: Sequence[str], residuals: Floats) -> Iterator[list[str]]:
     for row in range(0, len(frames), FRAMES_ACROSS):
         own = slice(row, row + FRAMES_ACROSS)
-        values = ["".join(fixed(value, 12, 0) for value in axis[own]) for axis in 1000 * residuals.T]
+        values = ["".join(fixed(value, 12, 0) for value in axis) for axis in 1000 * residuals[own].T]
         names = "".join(f"{frame:>12}" for frame in frames[own])
         yield [f"{'' if row else name:<10}{names}", *(f"{'':10}{line}" for line in values), ""]
 
